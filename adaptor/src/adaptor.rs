@@ -86,7 +86,7 @@ pub struct Adaptor {
     /// The changes of pipelines that were taken in.
     changes: Arc<Changes>,
     /// Changes of pipelines that all ranks know of and that were not made yet.
-    told_changes: Vec<changing::Told>,
+    waiting_changes: Vec<changing::WaitingChange>,
     /// How many changes of pipelines were made.
     changed: u64,
     /// Whether the solver was told that the step to come does not look at its mesh and fields.
@@ -105,9 +105,9 @@ pub struct Adaptor {
     /// The step of the last call, and whether there was one.
     moment: Moment,
     has_begun: bool,
-    told: Arc<Told>,
+    described: Arc<Described>,
     /// The stack of edits that viewers were told of last.
-    told_stack: EditStack,
+    reported_stack: EditStack,
     /// The flow conditions of the features, by name.
     conditions: BTreeMap<String, Condition>,
     paused: bool,
@@ -129,7 +129,7 @@ struct Meetings {
 
 /// The part of `hello` that does not change from order to order.
 #[derive(Default)]
-struct Told {
+struct Described {
     channel: String,
     fields: Value,
     features: Value,
@@ -241,8 +241,8 @@ impl Adaptor {
     /// Where the file cannot be written.
     pub fn invitation(&mut self, terminal: bool) -> std::io::Result<Option<String>> {
         let terminal = terminal && self.communicator.size() == 1;
-        let invite = |server: &mut Server| server.invitation(&self.output, terminal);
-        self.server.as_mut().map(invite).transpose()
+        let invite = |server: &Server| server.invitation(&self.output, terminal);
+        self.server.as_ref().map(invite).transpose()
     }
 
     /// The address that viewers connect to; `None` without a server, and where it listens on a path.
@@ -336,7 +336,7 @@ impl Adaptor {
         };
         let looks = by_orders
             || is_called
-            || !self.told_changes.is_empty()
+            || !self.waiting_changes.is_empty()
             || self.timed.is_due(moment)
             || self.resumed.is_due(moment.cycle)
             || self.pipelines.is_due(moment);
@@ -451,7 +451,7 @@ impl Adaptor {
         // All ranks know alike of a motion under way; what only the step's own numbers could tell
         // is left for the next meeting.
         let under_way = self.paused
-            || !self.told_changes.is_empty()
+            || !self.waiting_changes.is_empty()
             || !self.resumed.is_over()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
         if !due && !under_way {
@@ -472,7 +472,7 @@ impl Adaptor {
         at_rest
             && !self.paused
             && !called
-            && self.told_changes.is_empty()
+            && self.waiting_changes.is_empty()
             && !self.timed.is_due(moment)
             && !self.resumed.is_due(moment.cycle)
             && !self.pipelines.is_due(moment)

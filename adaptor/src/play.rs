@@ -70,7 +70,7 @@ impl Playback {
     ///
     /// # Errors
     /// Where the file of the links cannot be written.
-    pub fn invitation(&mut self, directory: &Path, terminal: bool) -> io::Result<String> {
+    pub fn invitation(&self, directory: &Path, terminal: bool) -> io::Result<String> {
         self.server.invitation(directory, terminal)
     }
 }

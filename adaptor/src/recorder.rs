@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 
 use crate::{
     recording::{HEAD, Head, Kind, MAGIC, RecordError, read_head, write},
-    stream::{EXACT, Hub, Observer, Told},
+    stream::{EXACT, Hub, Observed, Observer},
 };
 
 /// After how long a view is recorded with a key frame again, so that it can be gone to.
@@ -135,7 +135,7 @@ impl Writing {
     fn write_until_end(&mut self) -> Result<(), String> {
         loop {
             match self.observer.next() {
-                Some(Told::Hello) => {
+                Some(Observed::Hello) => {
                     let orders = self.orders.take();
                     let is_first = orders.is_some();
                     let text = self.hub.hello_for_all(orders);
@@ -145,15 +145,15 @@ impl Writing {
                         self.put(Kind::Stack, 0, text.as_bytes())?;
                     }
                 }
-                Some(Told::Text(text)) => {
+                Some(Observed::Text(text)) => {
                     let text = text.written();
                     self.put(Kind::of_text(&text), 0, text.as_bytes())?;
                 }
-                Some(Told::Stack(change)) => {
+                Some(Observed::Stack(change)) => {
                     let text = self.hub.whole_stack(Some(change));
                     self.put(Kind::Stack, 0, text.as_bytes())?;
                 }
-                Some(Told::Frame { view, is_key, bytes }) => {
+                Some(Observed::Frame { view, is_key, bytes }) => {
                     let number = u32::try_from(view).unwrap_or(u32::MAX);
                     let kind = if is_key { Kind::KeyFrame } else { Kind::NextFrame };
                     self.put(kind, number, &bytes)?;
@@ -165,9 +165,9 @@ impl Writing {
                         self.hub.want_key(view, EXACT);
                     }
                 }
-                Some(Told::Behind(view)) => self.hub.want_key(view, EXACT),
-                Some(Told::End) => return self.out.flush().map_err(|error| error.to_string()),
-                Some(Told::TooMuch) => return Err("the disk is too slow for what is told".into()),
+                Some(Observed::Behind(view)) => self.hub.want_key(view, EXACT),
+                Some(Observed::End) => return self.out.flush().map_err(|error| error.to_string()),
+                Some(Observed::TooMuch) => return Err("the disk is too slow for what viewers are sent".into()),
                 None => {
                     self.out.flush().map_err(|error| error.to_string())?;
                     self.observer.wait(PERIOD);

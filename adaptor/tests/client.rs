@@ -20,7 +20,7 @@ use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
 use serde_json::Value;
 use tombolo::{
     OrderStatus, Parameter, Report,
-    client::{Client, ClientError, Event, Link, Options, Told},
+    client::{Client, ClientError, Event, Link, Options, Received},
     pipelines::language::{Order, parse_valid},
 };
 
@@ -81,7 +81,7 @@ fn order(by: f64) -> Order {
 }
 
 /// Reads until an event fits.
-fn until<T>(client: &Client, what: &str, fits: impl Fn(&Told) -> Option<T>) -> T {
+fn until<T>(client: &Client, what: &str, fits: impl Fn(&Received) -> Option<T>) -> T {
     loop {
         let told = client.next(PATIENCE).unwrap_or_else(|error| panic!("{what}: {error}"));
         let told = told.unwrap_or_else(|| panic!("no {what}"));

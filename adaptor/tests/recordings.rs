@@ -108,7 +108,7 @@ fn viewers_go_through_a_recording() {
     record(output.path(), "", 60);
     let last = Recording::open(&file).unwrap().last();
     let settings =
-        StreamServer { listen: "127.0.0.1:0".parse().unwrap(), ..StreamServer::default() };
+        StreamServer { listen: Some("127.0.0.1:0".parse().unwrap()), ..StreamServer::default() };
     let playback = Playback::start(&file, &settings).unwrap();
     let link: Link = playback.link().parse().unwrap();
     let client = Client::connect(&link, &Options::default()).unwrap();

@@ -463,7 +463,7 @@ mod tests {
         );
         assert_eq!(config.journal.as_deref(), Some("a.jsonl"));
         assert!(config.stream.as_ref().is_some_and(
-            |stream| matches!(stream.listen, Listen::Address(address) if address.port() == 0)
+            |stream| matches!(stream.listen, Some(Listen::Address(address)) if address.port() == 0)
         ));
         assert_eq!(
             found.notes,

@@ -108,9 +108,10 @@ impl Session {
                     InitializeError::Stream(_) | InitializeError::Rank(_),
                 )) => {
                     if let Some(stream) = &mut settings.config.stream
-                        && let Listen::Address(address) = &mut stream.listen
+                        && let Some(Listen::Address(mut address)) = stream.place()
                     {
                         address.set_port(0);
+                        stream.listen = Some(Listen::Address(address));
                     }
                     Run::new((**settings).clone())?
                 }

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// A change of the pipelines that all ranks know of.
-pub(super) struct Told {
+pub(super) struct WaitingChange {
     id: String,
     source: Source,
     change: PipelineChange,
@@ -26,7 +26,7 @@ pub(super) struct Told {
     _reservation: Option<Reservation>,
 }
 
-impl Told {
+impl WaitingChange {
     /// The command as it is saved.
     pub(super) fn saved(&self) -> SavedCommand {
         SavedCommand {
@@ -80,13 +80,13 @@ impl Adaptor {
         change: PipelineChange,
         reservation: Option<Reservation>,
     ) {
-        self.told_changes.push(Told { id, source, change, _reservation: reservation });
+        self.waiting_changes.push(WaitingChange { id, source, change, _reservation: reservation });
     }
 
     /// Makes the changes that all ranks were told of. All have lent the whole mesh with its fields.
     /// Collective.
     pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {
-        for Told { id, source, change, .. } in std::mem::take(&mut self.told_changes) {
+        for WaitingChange { id, source, change, .. } in std::mem::take(&mut self.waiting_changes) {
             let made = self.make_change(&change, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));

@@ -33,7 +33,7 @@ impl Adaptor {
         // too.
         let note = CheckpointNote { id: id.clone(), cycle, time };
         self.log.note_and_wait(&JournalNote::Checkpoint(note));
-        let changes = self.told_changes.iter().map(super::changing::Told::saved);
+        let changes = self.waiting_changes.iter().map(super::changing::WaitingChange::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
         self.queue.look(|received| {
             waiting.push(SavedCommand {

@@ -38,7 +38,7 @@ impl Adaptor {
         } else {
             None
         };
-        for (id, command) in self.told_to_all(taken.into_iter().collect()) {
+        for (id, command) in self.agreed_with_all(taken.into_iter().collect()) {
             self.obey(id, &source, command, None, moment);
         }
     }
@@ -68,7 +68,7 @@ impl Adaptor {
 
     /// The commands of rank 0 on all ranks, so that they take effect at the same cycle everywhere.
     /// Collective; free on one process.
-    fn told_to_all(&self, commands: Vec<(String, Command)>) -> Vec<(String, Command)> {
+    fn agreed_with_all(&self, commands: Vec<(String, Command)>) -> Vec<(String, Command)> {
         meeting::share(&*self.communicator, commands).unwrap_or_else(|reason| {
             self.complain(&reason);
             Vec::new()
@@ -107,7 +107,7 @@ impl Adaptor {
             })
             .unzip();
         let mut whence = whence.into_iter();
-        for (id, command) in self.told_to_all(own) {
+        for (id, command) in self.agreed_with_all(own) {
             // Only rank 0 has viewers to answer.
             let (source, reservation) = whence.next().unwrap_or((Source::Viewer(0), None));
             self.obey(id, &source, command, reservation, moment);
@@ -116,7 +116,7 @@ impl Adaptor {
         self.forecast();
         // A command that came after the solver had asked whether its mesh is looked at is for the next
         // call, which is lent the mesh whole.
-        let looks = !self.told_changes.is_empty()
+        let looks = !self.waiting_changes.is_empty()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if steerer.looks_at_mesh());
         if looks && self.communicator.any(*self.is_spared.get_mut()) {
             return;
@@ -163,7 +163,7 @@ impl Adaptor {
             .iter()
             .map(|asked| (String::new(), Command::Order((*asked.order).clone())))
             .collect();
-        for (index, (_, command)) in self.told_to_all(asked).into_iter().enumerate() {
+        for (index, (_, command)) in self.agreed_with_all(asked).into_iter().enumerate() {
             let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh)
             else {
                 continue;

@@ -17,7 +17,7 @@ impl Adaptor {
         let Some(hub) = &self.hub else { return };
         let (views, monitors) = (self.pipelines.views(), self.pipelines.monitors());
         let (views, monitors) = (Arc::clone(views), Arc::clone(monitors));
-        let (changed, told) = (self.changed, Arc::clone(&self.told));
+        let (changed, described) = (self.changed, Arc::clone(&self.described));
         let (parameters, defaults) = (self.parameters.all().to_vec(), self.defaults.clone());
         hub.describe(move || {
             let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
@@ -27,10 +27,10 @@ impl Adaptor {
                 "views": *views,
                 "monitors": *monitors,
                 "pipelines": {"changes": changed},
-                "channel": told.channel,
-                "features": list(&told.features),
-                "surface": told.surface,
-                "fields": list(&told.fields),
+                "channel": described.channel,
+                "features": list(&described.features),
+                "surface": described.surface,
+                "fields": list(&described.fields),
                 "parameters": parameters,
                 "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
             });
@@ -46,13 +46,13 @@ impl Adaptor {
             SteeredMesh::Steered(steerer, _) => steerer.stack(),
             _ => &none,
         };
-        let (before, edits) = (self.told_stack.count(), now.count());
-        let kept = self.told_stack.shared(now);
-        let is_same = (before, edits) == (kept, kept) && self.told_stack.orders() == now.orders();
+        let (before, edits) = (self.reported_stack.count(), now.count());
+        let kept = self.reported_stack.shared(now);
+        let is_same = (before, edits) == (kept, kept) && self.reported_stack.orders() == now.orders();
         if is_same {
             return;
         }
-        self.told_stack = now.clone();
+        self.reported_stack = now.clone();
         let stack = now.clone();
         hub.stack([edits, kept, stack.orders()], move |from, next| {
             let _all = stack.present().skip(from).all(next);

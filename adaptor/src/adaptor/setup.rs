@@ -83,8 +83,8 @@ impl Adaptor {
         }
         let run = random_name();
         let queue = Arc::new(Queue::default());
-        let is_told = config.stream.is_some() || config.record.is_some();
-        let hub = (is_told && first).then(|| Arc::new(Hub::default()));
+        let has_audience = config.stream.is_some() || config.record.is_some();
+        let hub = (has_audience && first).then(|| Arc::new(Hub::default()));
         if let Some(hub) = &hub {
             hub.offer_pipelines(&config.pipelines);
         }
@@ -171,7 +171,7 @@ impl Adaptor {
             hub,
             clock,
             changes,
-            told_changes: Vec::new(),
+            waiting_changes: Vec::new(),
             changed: 0,
             is_spared: AtomicBool::new(false),
             watch,
@@ -182,8 +182,8 @@ impl Adaptor {
             mesh: SteeredMesh::Unknown,
             lent: Lent::default(),
             moment,
-            told: Arc::default(),
-            told_stack: EditStack::default(),
+            described: Arc::default(),
+            reported_stack: EditStack::default(),
             conditions,
             paused: false,
             stopped: false,

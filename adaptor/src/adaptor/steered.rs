@@ -14,7 +14,7 @@ use tombolo_deform::{
 use tombolo_pipelines::extract::{Channel, ChannelError};
 
 use super::{
-    Adaptor, Told,
+    Adaptor, Described,
     description::{features, unknown_conditions},
 };
 use crate::{
@@ -108,10 +108,10 @@ impl Adaptor {
         let fields = channel.fields.iter().map(
             |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
         );
-        let mut told =
-            Told { channel: channel.name.to_owned(), fields: fields.collect(), ..Told::default() };
+        let mut described =
+            Described { channel: channel.name.to_owned(), fields: fields.collect(), ..Described::default() };
         if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
-            told.features = features(surface, &self.conditions);
+            described.features = features(surface, &self.conditions);
             if let Some(unknown) = unknown_conditions(surface, &self.conditions) {
                 self.complain(&unknown);
             }
@@ -120,11 +120,11 @@ impl Adaptor {
                     let _ = self.forecaster.set(forecaster);
                 }
                 let surface = ReferenceSurface::new(Arc::clone(surface));
-                told.surface = surface.described();
+                described.surface = surface.described();
                 hub.offer_surface(Arc::new(surface));
             }
         }
-        self.told = Arc::new(told);
+        self.described = Arc::new(described);
         self.describe();
         // A run that goes on from a checkpoint has one.
         self.tell_stack();

@@ -11,7 +11,7 @@ use crate::{OrderReport, Parameter};
 
 /// Something that a run told.
 #[derive(Debug, Clone)]
-pub struct Told {
+pub struct Received {
     /// The message, decoded.
     pub event: Event,
     /// The message as it came, one JSON object; empty for a frame and for what the client itself

@@ -1,8 +1,6 @@
 //! One request for what a run serves beside its WebSocket.
 
-use std::time::Duration;
-
-use std::sync::Arc;
+use std::{path::Path, sync::Arc, time::Duration};
 
 use rustls::pki_types::ServerName;
 use tokio::{
@@ -31,46 +29,58 @@ pub(super) struct Answer {
 }
 
 /// A connection of any kind.
-pub(super) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
+pub(crate) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
 
 impl<S: AsyncRead + AsyncWrite + Send + Unpin> Stream for S {}
 
 /// Connects to where a link leads.
 pub(super) async fn open(link: &Link) -> Result<Box<dyn Stream>, ClientError> {
-    let address = || link.address();
-    let unreachable = |reason: String| ClientError::Unreachable { address: address(), reason };
     match link.way() {
-        Way::Plain => Ok(Box::new(open_address(link).await?)),
-        Way::Encrypted(pinned) => {
-            let stream = open_address(link).await?;
-            let certificate =
-                |reason: String| ClientError::Certificate { address: address(), reason };
-            let config =
-                tls::config(pinned.as_deref()).map_err(|error| certificate(error.to_string()))?;
-            let name = ServerName::try_from(link.name().to_owned())
-                .map_err(|error| certificate(error.to_string()))?;
-            let shaken = TlsConnector::from(Arc::new(config)).connect(name, stream);
-            match timeout(CONNECT, shaken).await {
-                Ok(Ok(stream)) => Ok(Box::new(stream)),
-                Ok(Err(error)) => Err(certificate(error.to_string())),
-                Err(_) => Err(unreachable("it does not shake hands".into())),
-            }
+        Way::Plain | Way::Encrypted(_) => encrypt(link, open_address(link).await?).await,
+        Way::Socket(path) => open_path(link, path).await,
+    }
+}
+
+#[cfg(unix)]
+async fn open_path(link: &Link, path: &Path) -> Result<Box<dyn Stream>, ClientError> {
+    let address = link.address();
+    match tokio::net::UnixStream::connect(path).await {
+        Ok(stream) => Ok(Box::new(stream)),
+        Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
+            Err(ClientError::Refused { address })
         }
-        #[cfg(unix)]
-        Way::Socket(path) => match tokio::net::UnixStream::connect(path).await {
-            Ok(stream) => Ok(Box::new(stream)),
-            Err(error) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
-                Err(ClientError::Refused { address: address() })
-            }
-            Err(error) => Err(unreachable(error.to_string())),
-        },
-        #[cfg(not(unix))]
-        Way::Socket(_) => Err(unreachable("this system has no such sockets".into())),
+        Err(error) => Err(ClientError::Unreachable { address, reason: error.to_string() }),
+    }
+}
+
+#[cfg(not(unix))]
+async fn open_path(link: &Link, _: &Path) -> Result<Box<dyn Stream>, ClientError> {
+    let reason = "this system has no such sockets".into();
+    Err(ClientError::Unreachable { address: link.address(), reason })
+}
+
+/// Encrypts a connection where its link says so, and makes sure of the certificate.
+pub(crate) async fn encrypt(
+    link: &Link,
+    stream: TcpStream,
+) -> Result<Box<dyn Stream>, ClientError> {
+    let Way::Encrypted(pinned) = link.way() else { return Ok(Box::new(stream)) };
+    let address = link.address();
+    let certificate =
+        |reason: String| ClientError::Certificate { address: link.address(), reason };
+    let config = tls::config(pinned.as_deref()).map_err(|error| certificate(error.to_string()))?;
+    let name = ServerName::try_from(link.name().to_owned())
+        .map_err(|error| certificate(error.to_string()))?;
+    let shaken = TlsConnector::from(Arc::new(config)).connect(name, stream);
+    match timeout(CONNECT, shaken).await {
+        Ok(Ok(stream)) => Ok(Box::new(stream)),
+        Ok(Err(error)) => Err(certificate(error.to_string())),
+        Err(_) => Err(ClientError::Unreachable { address, reason: "it does not shake hands".into() }),
     }
 }
 
 /// The addresses that the system knows for a link's host, tried one after the other.
-async fn open_address(link: &Link) -> Result<TcpStream, ClientError> {
+pub(crate) async fn open_address(link: &Link) -> Result<TcpStream, ClientError> {
     let unknown = |reason: String| ClientError::Unknown { host: link.host().into(), reason };
     let addresses = tokio::net::lookup_host((link.name(), link.port())).await;
     let mut failure = unknown("the system names none".into());

@@ -97,8 +97,9 @@ use tombolo_pipelines::{
 pub use error::ClientError;
 pub use event::{
     Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Precision, Role,
-    StackChange, Status, StatusQuality, Told, Values, View,
+    Received, StackChange, Status, StatusQuality, Values, View,
 };
+pub(crate) use get::{Stream, encrypt, open_address};
 pub use link::Link;
 use state::{Pending, Shared};
 
@@ -222,7 +223,7 @@ impl Client {
     /// # Errors
     /// [`ClientError::Closed`] behind the last event of a run that has ended, and
     /// [`ClientError::Lost`] where the connection could not be made again.
-    pub fn next(&self, patience: Duration) -> Result<Option<Told>, ClientError> {
+    pub fn next(&self, patience: Duration) -> Result<Option<Received>, ClientError> {
         self.shared.next(patience)
     }
 

@@ -10,7 +10,7 @@ use std::{
 use tokio::sync::Notify;
 use tombolo_pipelines::encode::DecodedFrame;
 
-use super::{ClientError, End, Event, Hello, Role, Status, Told};
+use super::{ClientError, End, Event, Hello, Role, Status, Received};
 use crate::lock::lock;
 
 /// Texts that wait to be read, and their bytes; beyond either the oldest make way.
@@ -40,13 +40,13 @@ pub(super) struct Pending {
 
 /// A frame that waits to be read.
 struct Waiting {
-    frame: Told,
+    frame: Received,
     connection: u64,
 }
 
 #[derive(Default)]
 pub(super) struct State {
-    texts: VecDeque<Told>,
+    texts: VecDeque<Received>,
     bytes: usize,
     frames: VecDeque<Waiting>,
     pub(super) hello: Option<Arc<Hello>>,
@@ -132,7 +132,7 @@ impl Shared {
     }
 
     /// The next event, the texts before the frames.
-    pub(super) fn next(&self, patience: Duration) -> Result<Option<Told>, ClientError> {
+    pub(super) fn next(&self, patience: Duration) -> Result<Option<Received>, ClientError> {
         let next = self.wait(patience, |state| match state.take() {
             Some(told) => Some(Ok(told)),
             None => state.failure.clone().map(Err),
@@ -145,7 +145,7 @@ impl Shared {
 }
 
 impl State {
-    fn take(&mut self) -> Option<Told> {
+    fn take(&mut self) -> Option<Received> {
         if let Some(told) = self.texts.pop_front() {
             self.bytes -= told.text.len();
             return Some(told);
@@ -182,7 +182,7 @@ impl State {
             }
         }
         self.bytes = self.texts.iter().map(|told| told.text.len()).sum::<usize>() + text.len();
-        self.texts.push_back(Told { event, text: text.into() });
+        self.texts.push_back(Received { event, text: text.into() });
         while self.texts.len() > TEXTS || self.bytes > BYTES && self.texts.len() > 1 {
             let monitor = self.texts.iter().position(|t| matches!(t.event, Event::Monitor(_)));
             if let Some(gone) = self.texts.remove(monitor.unwrap_or(0)) {
@@ -194,7 +194,7 @@ impl State {
 
     /// Takes the error out that answers a command.
     pub(super) fn said(&mut self, id: &str) -> Option<String> {
-        let answers = |told: &Told| matches!(&told.event, Event::Error(error) if error.id.as_deref() == Some(id));
+        let answers = |told: &Received| matches!(&told.event, Event::Error(error) if error.id.as_deref() == Some(id));
         let told =
             self.texts.iter().position(answers).and_then(|found| self.texts.remove(found))?;
         self.bytes -= told.text.len();
@@ -206,7 +206,7 @@ impl State {
 
     /// Takes a frame in.
     pub(super) fn put_frame(&mut self, frame: DecodedFrame) {
-        let frame = Told { event: Event::Frame(frame.into()), text: "".into() };
+        let frame = Received { event: Event::Frame(frame.into()), text: "".into() };
         self.frames.push_back(Waiting { frame, connection: self.connection });
         if self.frames.len() > FRAMES {
             if let Some(Waiting { connection, .. }) = self.frames.pop_front() {

@@ -144,5 +144,5 @@ fn tell(errors: &LanguageErrors, as_json: bool) -> Result<(), Failure> {
         eprintln!("{errors}");
         eprintln!("tombolo: {} error(s)", errors.count());
     }
-    Err(Failure::Told)
+    Err(Failure::Reported)
 }

@@ -8,6 +8,7 @@ mod export;
 mod features;
 mod mesh;
 mod play;
+mod relay;
 mod remote;
 mod skeleton;
 
@@ -53,6 +54,8 @@ enum Task {
     Skeleton(skeleton::Options),
     /// Show a recording in the viewer
     Play(play::Options),
+    /// Let runs connect here, and viewers reach them through it
+    Relay(relay::Options),
     /// Write files of a recording: VTK, CSV, pictures
     Export(export::Options),
     #[command(flatten)]
@@ -76,7 +79,7 @@ enum Failure {
     /// Something is wrong with what was given: exit code 1.
     Wrong(String),
     /// Something is wrong with what was given, and was said already: exit code 1.
-    Told,
+    Reported,
     /// The shape that was asked for is refused: exit code 2.
     Refused(String),
     /// A run is not reached, or a task that would reach it was used wrongly: exit code 2.
@@ -107,6 +110,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Task::Edit(options) => edit::edit(&options),
         Task::Skeleton(options) => skeleton::skeleton(&options),
         Task::Play(options) => play::play(&options),
+        Task::Relay(options) => relay::relay(&options),
         Task::Export(options) => export::export(&options),
         Task::Remote(task) => remote::run(&task),
     };
@@ -116,7 +120,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             eprintln!("tombolo: {message}");
             1
         }
-        Err(Failure::Told) => 1,
+        Err(Failure::Reported) => 1,
         Err(Failure::Refused(message)) => {
             eprintln!("tombolo: refused: {message}");
             2

@@ -26,11 +26,9 @@ pub(crate) struct Options {
 /// Serves a recording until it is interrupted.
 pub(crate) fn play(options: &Options) -> Result<(), Failure> {
     let mut settings = StreamServer::default();
-    if let Some(listen) = &options.listen {
-        settings.listen = listen.clone();
-    }
+    settings.listen.clone_from(&options.listen);
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
-    let mut playback = Playback::start(&options.file, &settings)?;
+    let playback = Playback::start(&options.file, &settings)?;
     let directory = std::env::temp_dir();
     let invitation = playback.invitation(&directory, std::io::stdout().is_terminal())?;
     say(&invitation)?;

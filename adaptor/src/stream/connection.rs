@@ -38,12 +38,29 @@ const WRITE_TIME: Duration = Duration::from_secs(20);
 pub(super) struct Connection {
     guest: Arc<Guest>,
     pool: Arc<Pool>,
+    way: Way,
+}
+
+/// The way by which a connection has come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// To the socket that the server listens on.
+    Direct,
+    /// Through a relay.
+    Relayed {
+        /// Whether the viewer's connection to the relay is encrypted.
+        is_encrypted: bool,
+    },
 }
 
 impl Connection {
     /// Takes in a connection from an address; where there are too many like it, another makes way.
-    pub(super) fn enter(pool: &Arc<Pool>, address: IpAddr) -> Self {
-        Self { guest: pool.enter(address), pool: Arc::clone(pool) }
+    pub(super) fn enter(pool: &Arc<Pool>, address: IpAddr, way: Way) -> Self {
+        Self { guest: pool.enter(address), pool: Arc::clone(pool), way }
+    }
+
+    pub(super) fn way(&self) -> Way {
+        self.way
     }
 
     pub(super) fn address(&self) -> IpAddr {
@@ -93,10 +110,6 @@ impl TimedStream {
             read_deadline: Box::pin(sleep_until(Instant::now() + UNKNOWN_TIME)),
             write_deadline: None,
         }
-    }
-
-    pub(super) fn connection(&self) -> &Connection {
-        &self.connection
     }
 
     fn still_here(&mut self) {

@@ -3,14 +3,14 @@
 
 use std::{
     collections::VecDeque,
-    fs::File,
-    io::Read,
+    fs::{File, OpenOptions},
+    io::{Read, Write},
     path::Path,
     sync::{Arc, Mutex},
 };
 
 use axum::http::{HeaderMap, Uri, header};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use tombolo_pipelines::language::StreamServer;
 
 use super::{StreamError, allowance::Allowance, secret::Secret};
@@ -19,6 +19,10 @@ use crate::lock::lock;
 /// The variables of the environment that give the secrets.
 const DRIVING_VARIABLE: &str = "TOMBOLO_DRIVING_SECRET";
 const WATCHING_VARIABLE: &str = "TOMBOLO_WATCHING_SECRET";
+const RELAY_VARIABLE: &str = "TOMBOLO_RELAY_SECRET";
+/// What the names of a run's cookies begin with.
+const COOKIE: &str = "tombolo";
+const EXPECTED: &str = "expected a secret of 16 to 128 letters, digits, '-' or '_'";
 /// Keys that may wait to be used; older ones make way.
 const KEYS: usize = 64;
 /// Sessions that are known of each access; older ones make way.
@@ -33,6 +37,16 @@ pub(super) enum Access {
     Watch,
     /// May be the driver.
     Drive,
+}
+
+impl Access {
+    /// The name of these rights.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Watch => "watch",
+            Self::Drive => "drive",
+        }
+    }
 }
 
 /// One who has shown a secret.
@@ -71,14 +85,76 @@ pub(super) struct Credentials {
     drive: (Secret, Holder),
     watch: (Secret, Holder),
     issued: Mutex<Issued>,
+    /// The name of the cookie, before its port.
+    cookie: &'static str,
 }
 
 /// A file of secrets.
-#[derive(Deserialize, Default)]
+#[derive(Serialize, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
 struct SecretsFile {
+    #[serde(skip_serializing_if = "Option::is_none")]
     drive: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     watch: Option<String>,
+    /// The secret that a relay asks runs for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relay: Option<String>,
+}
+
+/// One of the secrets of a file, which is made where the file is missing.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum KeptSecret {
+    Watch,
+    Relay,
+}
+
+impl KeptSecret {
+    /// The secret in a file that nobody but its owner can read; the message says why there is none.
+    pub(super) fn kept(self, path: &Path) -> Result<Secret, String> {
+        let failed = |error: std::io::Error| error.to_string();
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        match options.open(path) {
+            Ok(mut file) => {
+                let secret = Secret::random().map_err(|error| error.to_string())?;
+                let text = Some(secret.as_str().to_owned());
+                let kept = match self {
+                    Self::Watch => SecretsFile { watch: text, ..SecretsFile::default() },
+                    Self::Relay => SecretsFile { relay: text, ..SecretsFile::default() },
+                };
+                serde_json::to_writer(&mut file, &kept).map_err(|error| error.to_string())?;
+                file.write_all(b"\n").map_err(failed)?;
+                Ok(secret)
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                let file = read(path).map_err(|error| error.to_string())?;
+                let (name, text) = match self {
+                    Self::Watch => ("watch", file.watch),
+                    Self::Relay => ("relay", file.relay),
+                };
+                let text = text.ok_or_else(|| format!("it holds no secret `{name}`"))?;
+                Secret::given(&text).ok_or_else(|| format!("{name}: {EXPECTED}"))
+            }
+            Err(error) => Err(failed(error)),
+        }
+    }
+}
+
+/// The secret that a run shows a relay.
+pub(super) fn relay_secret(settings: &StreamServer) -> Result<Secret, StreamError> {
+    let file = match &settings.secrets {
+        Some(file) => read(Path::new(file))?.relay,
+        None => None,
+    };
+    let named = settings.secrets.as_deref().unwrap_or_default();
+    given([(RELAY_VARIABLE, variable(RELAY_VARIABLE)), (named, file)])?.ok_or_else(|| {
+        StreamError::Relay(format!(
+            "the relay's secret for runs is missing: give it as `relay` in the file that `stream.secrets` names, or as {RELAY_VARIABLE}"
+        ))
+    })
 }
 
 impl Credentials {
@@ -101,11 +177,18 @@ impl Credentials {
                 "the secret for driving and the one for watching are the same".into(),
             ));
         }
-        Ok(Self {
+        Ok(Self::new(drive, watch, COOKIE))
+    }
+
+    /// Two secrets: of a run those for driving and for watching, of a relay that for runs and that for its
+    /// page. The last is what the names of cookies begin with.
+    pub(super) fn new(drive: Secret, watch: Secret, cookie: &'static str) -> Self {
+        Self {
             drive: (drive, Holder::new(Access::Drive)),
             watch: (watch, Holder::new(Access::Watch)),
             issued: Mutex::default(),
-        })
+            cookie,
+        }
     }
 
     pub(super) fn secret(&self, access: Access) -> &Secret {
@@ -175,22 +258,33 @@ impl Credentials {
 
     /// Who shows a cookie of this run.
     pub(super) fn visitor(&self, headers: &HeaderMap) -> Option<Holder> {
-        let name = cookie_name(headers);
-        let cookies = headers.get_all(header::COOKIE).iter();
-        let mut pairs = cookies
-            .filter_map(|value| value.to_str().ok())
-            .flat_map(|text| text.split(';'))
-            .filter_map(|pair| pair.trim().split_once('='));
+        let name = self.cookie_name(headers);
+        let mut pairs = cookies(headers).filter_map(|pair| pair.split_once('='));
         pairs.find_map(|(key, id)| if key == name { self.session(id) } else { None })
+    }
+
+    /// The cookies of a request but for the one of this server; `None` where there are no others.
+    pub(super) fn without_own_cookie(&self, headers: &HeaderMap) -> Option<String> {
+        let own = self.cookie_name(headers);
+        let is_other = |pair: &&str| pair.split('=').next() != Some(&own);
+        let others: Vec<&str> = cookies(headers).filter(is_other).collect();
+        (!others.is_empty()).then(|| others.join("; "))
+    }
+
+    /// The name of the cookie. Cookies do not know ports, so that it has the one that the browser sees
+    /// in it: several runs on one machine, or behind several tunnels, keep apart.
+    pub(super) fn cookie_name(&self, headers: &HeaderMap) -> String {
+        let host = headers.get(header::HOST).and_then(|host| host.to_str().ok());
+        let port = host.unwrap_or_default().rsplit_once(':');
+        let port = port.and_then(|(_, port)| port.parse::<u16>().ok());
+        format!("{}-{}", self.cookie, port.unwrap_or(80))
     }
 }
 
-/// The name of the cookie. Cookies do not know ports, so that it has the one that the browser sees
-/// in it: several runs on one machine, or behind several tunnels, keep apart.
-pub(super) fn cookie_name(headers: &HeaderMap) -> String {
-    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
-    let port = host.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
-    format!("tombolo-{}", port.unwrap_or(80))
+/// The cookies of a request, each as it stands there.
+fn cookies(headers: &HeaderMap) -> impl Iterator<Item = &str> {
+    let cookies = headers.get_all(header::COOKIE).iter();
+    cookies.filter_map(|value| value.to_str().ok()).flat_map(|text| text.split(';')).map(str::trim)
 }
 
 /// A parameter of the query, as it stands there.
@@ -204,15 +298,21 @@ fn variable(name: &str) -> Option<String> {
 }
 
 /// The first secret that is given, or a fresh one.
-fn first<const N: usize>(given: [(&str, Option<String>); N]) -> Result<Secret, StreamError> {
-    match given.into_iter().find_map(|(source, text)| Some((source, text?))) {
+fn first<const N: usize>(sources: [(&str, Option<String>); N]) -> Result<Secret, StreamError> {
+    match given(sources)? {
         None => Secret::random().map_err(StreamError::Token),
-        Some((source, text)) => Secret::given(&text).ok_or_else(|| {
-            StreamError::Secrets(format!(
-                "{source}: expected a secret of 16 to 128 letters, digits, '-' or '_'"
-            ))
-        }),
+        Some(secret) => Ok(secret),
     }
+}
+
+/// The first secret that is given.
+fn given<const N: usize>(
+    sources: [(&str, Option<String>); N],
+) -> Result<Option<Secret>, StreamError> {
+    let found = sources.into_iter().find_map(|(source, text)| Some((source, text?)));
+    let Some((source, text)) = found else { return Ok(None) };
+    let wrong = || StreamError::Secrets(format!("{source}: {EXPECTED}"));
+    Secret::given(&text).ok_or_else(wrong).map(Some)
 }
 
 /// Opens a file that holds a secret, which nobody but its owner may read; the message says why not.
@@ -240,7 +340,7 @@ fn read(path: &Path) -> Result<SecretsFile, StreamError> {
     file.take(FILE).read_to_string(&mut text).map_err(failed)?;
     // The parser's own words could quote a secret.
     serde_json::from_str(&text)
-        .map_err(|_| wrong(r#"expected {"drive": "SECRET", "watch": "SECRET"}, or one of them"#))
+        .map_err(|_| wrong(r#"expected {"drive": "SECRET", "watch": "SECRET", "relay": "SECRET"}, or some of them"#))
 }
 
 #[cfg(test)]

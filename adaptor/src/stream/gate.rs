@@ -3,7 +3,7 @@
 use std::{
     collections::HashMap,
     net::IpAddr,
-    sync::Mutex,
+    sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 
@@ -15,9 +15,10 @@ use axum::{
 };
 
 use super::{
-    Shared,
-    connection::Connection,
-    credentials::{Access, Holder, Shown, cookie_name, parameter},
+    connection::{Connection, Way},
+    credentials::{Access, Credentials, Holder, Shown, parameter},
+    relay::messages::ACCESS,
+    routes::Shared,
 };
 use crate::lock::lock;
 use tombolo_pipelines::language::{JournalNote, RefusedRequest};
@@ -27,7 +28,7 @@ const QUIET: Duration = Duration::from_secs(60);
 /// Addresses whose refusals are remembered.
 const ADDRESSES: usize = 256;
 
-const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another run; open the link that this run told when it began\n";
+const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another run; open the link that was printed when it began\n";
 const USED: &str = "this link opens one browser, once: it has been used, or is of another run. In the browser that it opened, \
 go to this address without the key. For another browser take a link from the file that the run named when it began\n";
 
@@ -44,6 +45,15 @@ const HEADERS: [(HeaderName, &str); 5] = [
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
+/// Lets in to a server: under which names, and by which secrets.
+pub(super) struct Gate {
+    pub(super) credentials: Arc<Credentials>,
+    pub(super) refusals: Refusals,
+    /// Whether it listens on a loopback address.
+    pub(super) is_loopback: bool,
+    pub(super) is_encrypted: bool,
+}
+
 /// Refuses requests under a foreign name, from a foreign page or with a wrong secret, trades what a
 /// link shows for a cookie, and puts the headers on every answer.
 pub(super) async fn guard(
@@ -52,56 +62,138 @@ pub(super) async fn guard(
     mut request: Request,
     next: Next,
 ) -> Response {
-    let mut response = match admit(&shared, &connection, &mut request) {
+    let answer = shared.gate.admit(&connection, &mut request);
+    let access = request.extensions().get::<Holder>().map(|holder| holder.access);
+    let mut response = match answer {
         None => next.run(request).await,
         Some(answer) => answer,
     };
-    let refused = [StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN].contains(&response.status());
-    if refused && shared.refusals.is_to_be_told(connection.address()) {
+    if shared.gate.log_refusal(&connection, &response) {
         let address = connection.address().to_string();
         shared.commands.note(JournalNote::Refused(RefusedRequest { address }));
-        log::warn!(
-            "a request from {} was refused: {}",
-            connection.address(),
-            if response.status() == StatusCode::UNAUTHORIZED {
-                "it showed no secret of this run"
-            } else {
-                "it came under a foreign name or from a page of another site"
-            }
-        );
     }
+    add_headers(&mut response);
+    // The relay gives those who have shown a secret more time.
+    if let (Way::Relayed { .. }, Some(access)) = (connection.way(), access) {
+        response.headers_mut().insert(ACCESS, HeaderValue::from_static(access.name()));
+    }
+    response
+}
+
+/// Puts the headers on an answer that keep it where it belongs.
+pub(super) fn add_headers(response: &mut Response) {
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
     }
     // What holds data of the run, or a secret, is kept nowhere.
     headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
-    response
 }
 
-/// Takes note of who asks, or has the answer for who goes no further.
-fn admit(shared: &Shared, connection: &Connection, request: &mut Request) -> Option<Response> {
-    if let Some(reason) = foreign(request.uri(), request.headers(), shared.loopback) {
-        return Some((StatusCode::FORBIDDEN, reason).into_response());
-    }
-    let is_page = matches!(request.uri().path(), "/" | "/index.html");
-    if is_page
-        && request.method() == Method::GET
-        && let Some(answer) = trade(shared, request)
-    {
-        return Some(answer);
-    }
-    match shared.credentials.shown(request.headers(), request.uri()) {
-        Shown::Right(holder) if connection.known(holder.access) => {
-            request.extensions_mut().insert(holder);
-            None
+impl Gate {
+    /// Takes note of who asks, or has the answer for who goes no further.
+    pub(super) fn admit(
+        &self,
+        connection: &Connection,
+        request: &mut Request,
+    ) -> Option<Response> {
+        if let Some(answer) = self.foreign(connection, request) {
+            return Some(answer);
         }
-        Shown::Right(_) => {
-            let reason = "too many connections are open already\n";
-            Some((StatusCode::SERVICE_UNAVAILABLE, reason).into_response())
+        let is_page = matches!(request.uri().path(), "/" | "/index.html");
+        if is_page
+            && request.method() == Method::GET
+            && let Some(answer) = self.trade(connection, request)
+        {
+            return Some(answer);
         }
-        Shown::Wrong => Some(unauthorized()),
-        Shown::Nothing => None,
+        match self.credentials.shown(request.headers(), request.uri()) {
+            Shown::Right(holder) if connection.known(holder.access) => {
+                request.extensions_mut().insert(holder);
+                None
+            }
+            Shown::Right(_) => {
+                let reason = "too many connections are open already\n";
+                Some((StatusCode::SERVICE_UNAVAILABLE, reason).into_response())
+            }
+            Shown::Wrong => Some(unauthorized()),
+            Shown::Nothing => None,
+        }
+    }
+
+    /// The answer to a request under a foreign name or from a foreign page. Through a relay the name is
+    /// the relay's, which has looked at it.
+    pub(super) fn foreign(&self, connection: &Connection, request: &Request) -> Option<Response> {
+        let is_loopback = self.is_loopback && connection.way() == Way::Direct;
+        foreign(request.uri(), request.headers(), is_loopback)
+            .map(|reason| (StatusCode::FORBIDDEN, reason).into_response())
+    }
+
+    /// Logs a refusal, once in a while for each address; whether it did.
+    pub(super) fn log_refusal(&self, connection: &Connection, response: &Response) -> bool {
+        let reason = match response.status() {
+            StatusCode::UNAUTHORIZED => "it showed no secret that is known here",
+            StatusCode::FORBIDDEN => "it came under a foreign name or from a page of another site",
+            _ => return false,
+        };
+        let is_new = self.refusals.is_to_be_logged(connection.address());
+        if is_new {
+            log::warn!("a request from {} was refused: {reason}", connection.address());
+        }
+        is_new
+    }
+
+    /// Answers a link of a browser with a cookie, and with the same page without what must stay secret.
+    fn trade(&self, connection: &Connection, request: &Request) -> Option<Response> {
+        let (uri, headers) = (request.uri(), request.headers());
+        let visitor = self.credentials.visitor(headers).map(|holder| holder.access);
+        let access = match (parameter(uri, "key"), parameter(uri, "token")) {
+            (Some(key), _) => match self.credentials.redeem(key).or(visitor) {
+                Some(access) => access,
+                None => return Some((StatusCode::UNAUTHORIZED, USED).into_response()),
+            },
+            (None, Some(token)) => match self.credentials.holder(token) {
+                Some(holder) => holder.access,
+                None => return Some(unauthorized()),
+            },
+            (None, None) => return None,
+        };
+        let mut response = StatusCode::SEE_OTHER.into_response();
+        let rest = uri.query().unwrap_or_default().split('&');
+        let rest: Vec<&str> =
+            rest.filter(|pair| !pair.starts_with("key=") && !pair.starts_with("token=")).collect();
+        // Relative, so that it holds behind a proxy's prefix too.
+        let place = if rest.is_empty() { "./".into() } else { format!("./?{}", rest.join("&")) };
+        if let Ok(place) = HeaderValue::from_str(&place) {
+            response.headers_mut().insert(header::LOCATION, place);
+        }
+        // One who has the cookie already keeps it.
+        if visitor != Some(access) {
+            match self.cookie(connection, headers, access) {
+                Some(cookie) => drop(response.headers_mut().insert(header::SET_COOKIE, cookie)),
+                None => return Some(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
+            }
+        }
+        Some(response)
+    }
+
+    /// A cookie for the directory of the page, as the browser sees it: under a prefix it goes to what is
+    /// below the prefix alone.
+    fn cookie(
+        &self,
+        connection: &Connection,
+        headers: &HeaderMap,
+        access: Access,
+    ) -> Option<HeaderValue> {
+        let id = self.credentials.begin(access).ok()?;
+        let name = self.credentials.cookie_name(headers);
+        let is_encrypted = match connection.way() {
+            Way::Direct => self.is_encrypted,
+            Way::Relayed { is_encrypted } => is_encrypted,
+        };
+        let secure = if is_encrypted { "; Secure" } else { "" };
+        let cookie = format!("{name}={}; HttpOnly; SameSite=Strict{secure}", id.as_str());
+        HeaderValue::from_str(&cookie).ok()
     }
 }
 
@@ -115,48 +207,6 @@ pub(super) async fn holders_only(request: Request, next: Next) -> Response {
         Some(_) => next.run(request).await,
         None => unauthorized(),
     }
-}
-
-/// Answers a link of a browser with a cookie, and with the same page without what must stay secret.
-fn trade(shared: &Shared, request: &Request) -> Option<Response> {
-    let (uri, headers) = (request.uri(), request.headers());
-    let visitor = shared.credentials.visitor(headers).map(|holder| holder.access);
-    let access = match (parameter(uri, "key"), parameter(uri, "token")) {
-        (Some(key), _) => match shared.credentials.redeem(key).or(visitor) {
-            Some(access) => access,
-            None => return Some((StatusCode::UNAUTHORIZED, USED).into_response()),
-        },
-        (None, Some(token)) => match shared.credentials.holder(token) {
-            Some(holder) => holder.access,
-            None => return Some(unauthorized()),
-        },
-        (None, None) => return None,
-    };
-    let mut response = StatusCode::SEE_OTHER.into_response();
-    let rest = uri.query().unwrap_or_default().split('&');
-    let rest: Vec<&str> =
-        rest.filter(|pair| !pair.starts_with("key=") && !pair.starts_with("token=")).collect();
-    // Relative, so that it holds behind a proxy's prefix too.
-    let place = if rest.is_empty() { "./".into() } else { format!("./?{}", rest.join("&")) };
-    if let Ok(place) = HeaderValue::from_str(&place) {
-        response.headers_mut().insert(header::LOCATION, place);
-    }
-    // One who has the cookie already keeps it.
-    if visitor != Some(access) {
-        match cookie(shared, headers, access) {
-            Some(cookie) => drop(response.headers_mut().insert(header::SET_COOKIE, cookie)),
-            None => return Some(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
-        }
-    }
-    Some(response)
-}
-
-fn cookie(shared: &Shared, headers: &HeaderMap, access: Access) -> Option<HeaderValue> {
-    let id = shared.credentials.begin(access).ok()?;
-    let name = cookie_name(headers);
-    let secure = if shared.is_encrypted { "; Secure" } else { "" };
-    let cookie = format!("{name}={}; HttpOnly; SameSite=Strict{secure}", id.as_str());
-    HeaderValue::from_str(&cookie).ok()
 }
 
 /// Why a request is refused for the name or the page that it comes by.
@@ -189,12 +239,12 @@ pub(super) struct Refusals(Mutex<HashMap<IpAddr, Instant>>);
 
 impl Refusals {
     /// Whether a refusal is the first of this address in a while.
-    pub(super) fn is_to_be_told(&self, address: IpAddr) -> bool {
-        let mut told = lock(&self.0);
-        told.retain(|_, at| at.elapsed() < QUIET);
-        let is_new = !told.contains_key(&address) && told.len() < ADDRESSES;
+    pub(super) fn is_to_be_logged(&self, address: IpAddr) -> bool {
+        let mut logged = lock(&self.0);
+        logged.retain(|_, at| at.elapsed() < QUIET);
+        let is_new = !logged.contains_key(&address) && logged.len() < ADDRESSES;
         if is_new {
-            told.insert(address, Instant::now());
+            logged.insert(address, Instant::now());
         }
         is_new
     }
@@ -247,13 +297,13 @@ mod tests {
     }
 
     #[test]
-    fn refusals_are_told_once_for_each_address() {
+    fn refusals_are_logged_once_for_each_address() {
         let refusals = Refusals::default();
         let address = |last: u32| IpAddr::from((0x0a00_0000 + last).to_be_bytes());
-        assert!(refusals.is_to_be_told(address(1)));
-        assert!(!refusals.is_to_be_told(address(1)));
-        assert!(refusals.is_to_be_told(address(2)));
-        let told = (0..1000).filter(|&last| refusals.is_to_be_told(address(last))).count();
-        assert!(told < ADDRESSES);
+        assert!(refusals.is_to_be_logged(address(1)));
+        assert!(!refusals.is_to_be_logged(address(1)));
+        assert!(refusals.is_to_be_logged(address(2)));
+        let logged = (0..1000).filter(|&last| refusals.is_to_be_logged(address(last))).count();
+        assert!(logged < ADDRESSES);
     }
 }

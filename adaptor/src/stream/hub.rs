@@ -23,7 +23,7 @@ use super::{
     credentials::Access,
     outbox::{Client, Frame},
     pace::{LEVELS, Pace},
-    stack::ToldStack,
+    stack::ReportedStack,
     text::Text,
     wheel::Wheel,
 };
@@ -112,7 +112,7 @@ pub(super) enum Arrival {
 #[derive(Default)]
 pub(super) struct HubState {
     description: Option<Describe>,
-    stack: ToldStack,
+    stack: ReportedStack,
     pub(super) conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
     views: BTreeMap<usize, View>,
@@ -126,7 +126,7 @@ pub(super) struct HubState {
     pub(super) costs: Vec<(String, Cost)>,
     /// Why the journal cannot be written.
     pub(super) journal_lost: Option<String>,
-    last_status: Option<(u64, Instant)>,
+    pub(super) last_status: Option<(u64, Instant)>,
     pub(super) status_dirty: bool,
     end: End,
     closed: bool,
@@ -421,7 +421,7 @@ impl Hub {
         lock(&self.state).surface.clone()
     }
 
-    pub(super) fn told_stack(&self) -> ToldStack {
+    pub(super) fn stack_of_edits(&self) -> ReportedStack {
         lock(&self.state).stack.clone()
     }
 
@@ -470,57 +470,6 @@ impl Hub {
         json!({ "hello": hello }).to_string()
     }
 
-    /// Puts a status into every outbox if anything in it changed. Called a few times a second.
-    pub(crate) fn status(&self) {
-        // The solver could wait for the lock: what is told is copied under it, and written later.
-        let Some(status) = self.new_status() else { return };
-        let text = Text::of(move || json!({ "status": status() }));
-        lock(&self.state).audience().for_each(|client| client.status(&text));
-    }
-
-    /// The status, where it has changed.
-    fn new_status(&self) -> Option<impl FnOnce() -> Map<String, Value> + Send + use<>> {
-        let (cycle, time) = self.clock.get();
-        let mut state = lock(&self.state);
-        if !state.has_audience() {
-            state.last_status = None;
-            return None;
-        }
-        let now = Instant::now();
-        let before = state.last_status;
-        if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty {
-            return None;
-        }
-        state.status_dirty = false;
-        // Measured over the steps since the last status, so that the solver need not look at a
-        // clock for it.
-        let step_seconds = before.and_then(|(last, at)| {
-            let steps = cycle.checked_sub(last).filter(|&steps| steps > 0)?;
-            #[expect(clippy::cast_precision_loss, reason = "steps of a fraction of a second")]
-            Some(now.duration_since(at).as_secs_f64() / steps as f64)
-        });
-        if before.is_none_or(|(last, _)| last != cycle) {
-            state.last_status = Some((cycle, now));
-        }
-        let mut status = state.conditions.clone();
-        let (viewers, driver) = (state.clients.len(), state.wheel.driver());
-        let (journal_lost, costs) = (state.journal_lost.clone(), state.costs.clone());
-        Some(move || {
-            status.insert("cycle".into(), cycle.into());
-            status.insert("time".into(), time.into());
-            status.insert("step_seconds".into(), step_seconds.into());
-            status.insert("viewers".into(), viewers.into());
-            status.insert("driver".into(), driver.map(name).into());
-            status.insert("journal_lost".into(), journal_lost.into());
-            let pipeline = |(name, cost): &(String, Cost)| {
-                json!({"name": name, "runs": cost.runs, "seconds": cost.seconds, "bytes": cost.bytes,
-                       "memory": cost.memory, "every": cost.every})
-            };
-            status.insert("pipelines".into(), costs.iter().map(pipeline).collect());
-            status
-        })
-    }
-
     pub(super) fn sent(&self, bytes: usize, frame: &Frame) {
         self.counters.frames.fetch_add(1, Ordering::Relaxed);
         self.counters.bytes.fetch_add(bytes as u64, Ordering::Relaxed);
@@ -534,11 +483,11 @@ impl HubState {
     }
 
     /// All who are told what happens.
-    fn audience(&self) -> impl Iterator<Item = &Arc<Client>> {
+    pub(super) fn audience(&self) -> impl Iterator<Item = &Arc<Client>> {
         self.clients.values().chain(&self.observer)
     }
 
-    fn has_audience(&self) -> bool {
+    pub(super) fn has_audience(&self) -> bool {
         self.audience().next().is_some()
     }
 

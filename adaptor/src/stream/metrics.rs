@@ -10,7 +10,7 @@ use axum::{
 };
 use serde_json::Value;
 
-use super::{Shared, hub::Hub};
+use super::{credentials::Holder, hub::Hub, routes::Shared};
 use crate::lock::lock;
 
 const TEXT: [(HeaderName, &str); 1] =
@@ -19,7 +19,7 @@ const TEXT: [(HeaderName, &str); 1] =
 /// Answers `GET /metrics`.
 pub(super) async fn metrics(
     State(shared): State<Shared>,
-    Extension(_): Extension<super::Holder>,
+    Extension(_): Extension<Holder>,
 ) -> Response {
     let mut text = Metrics::default();
     shared.hub.measure(&mut text);

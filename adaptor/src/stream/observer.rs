@@ -17,7 +17,7 @@ use super::{
 use crate::lock::lock;
 
 /// A message for somebody inside the program.
-pub(crate) enum Told {
+pub(crate) enum Observed {
     /// The run is described anew.
     Hello,
     /// A text message.
@@ -55,21 +55,21 @@ impl Observer {
     }
 
     /// The next message, if there is one.
-    pub(crate) fn next(&self) -> Option<Told> {
+    pub(crate) fn next(&self) -> Option<Observed> {
         Some(match self.client.next() {
             Ok(message) => match message? {
-                Message::Hello { .. } => Told::Hello,
-                Message::Text(text) => Told::Text(text),
-                Message::Stack(change) => Told::Stack(change),
+                Message::Hello { .. } => Observed::Hello,
+                Message::Text(text) => Observed::Text(text),
+                Message::Stack(change) => Observed::Stack(change),
                 Message::Frame(view, frame) => {
                     let is_key = frame.is_key();
                     let bytes = if is_key { frame.with_topology() } else { frame.message.clone() };
-                    Told::Frame { view, is_key, bytes }
+                    Observed::Frame { view, is_key, bytes }
                 }
-                Message::Behind(view, _) => Told::Behind(view),
-                Message::End => Told::End,
+                Message::Behind(view, _) => Observed::Behind(view),
+                Message::End => Observed::End,
             },
-            Err(_) => Told::TooMuch,
+            Err(_) => Observed::TooMuch,
         })
     }
 
@@ -81,10 +81,10 @@ impl Observer {
 }
 
 impl Hub {
-    /// Tells the observer nothing behind what it was told; how the run ends where that `is_untold`.
-    pub(crate) fn end_observing(&self, is_untold: bool) {
+    /// Tells the observer nothing behind what it was told; how the run ends where that `is_unfinished`.
+    pub(crate) fn end_observing(&self, is_unfinished: bool) {
         let Some(observer) = lock(&self.state).observer.clone() else { return };
-        if is_untold {
+        if is_unfinished {
             self.tell_end();
         }
         observer.end();
@@ -104,6 +104,6 @@ impl Hub {
 
     /// The stack of edits with the edits themselves, after a change or from the beginning.
     pub(crate) fn whole_stack(&self, change: Option<StackChange>) -> String {
-        self.told_stack().whole(change)
+        self.stack_of_edits().whole(change)
     }
 }

@@ -19,7 +19,7 @@ use tombolo_pipelines::language::{JournalNote, Message, parse_json};
 
 use super::{
     CommandSink,
-    stack::{Answer, recorded as recorded_stack, told as told_stack},
+    stack::{Answer, recorded_change, recorded_edits},
 };
 use crate::recording::{Moment, Recorded, RecordedMessage, Recording};
 
@@ -69,7 +69,7 @@ enum Said {
 
 /// Where a viewer is in a recording.
 #[derive(Debug, Serialize)]
-struct Told {
+struct Progress {
     seconds: f64,
     cycle: u64,
     time: f64,
@@ -96,7 +96,7 @@ impl Shown {
             Some(place) => (place, Recording::stack_at(&self.file, place).ok()??),
             None => Recording::open(&self.file).ok()?.stack(f64::INFINITY)?,
         };
-        recorded_stack(place, &text, from).ok()
+        recorded_edits(place, &text, from).ok()
     }
 
     /// Shows it to one viewer until either side ends.
@@ -214,7 +214,7 @@ struct Player {
     /// Where it was at this moment.
     at: (f64, Instant),
     moment: Moment,
-    told: Instant,
+    reported: Instant,
 }
 
 /// The viewer has gone.
@@ -239,7 +239,7 @@ impl Player {
             is_paused: false,
             at: (moment.seconds, now),
             moment,
-            told: now,
+            reported: now,
         }
     }
 
@@ -276,7 +276,7 @@ impl Player {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Err(Gone),
             }
-            if self.told.elapsed() >= PERIOD {
+            if self.reported.elapsed() >= PERIOD {
                 self.tell()?;
             }
         }
@@ -370,7 +370,7 @@ impl Player {
             "lost_bytes": self.recording.lost_bytes(),
         });
         let stack = self.recording.stack(seconds);
-        let stack = stack.and_then(|(place, text)| told_stack(place, &text).ok());
+        let stack = stack.and_then(|(place, text)| recorded_change(place, &text).ok());
         let own = [
             ("stack", stack.unwrap_or_default().described()),
             ("client", json!("c1")),
@@ -403,7 +403,7 @@ impl Player {
             RecordedMessage::Text(text) if text.starts_with("{\"end\"") => Ok(()),
             RecordedMessage::Text(text) if text.starts_with("{\"stack\"") => {
                 let place = self.recording.place_of_stack().unwrap_or_default();
-                match told_stack(place, &text) {
+                match recorded_change(place, &text) {
                     Ok(change) => self.put(Wire::Text(change.text().written())),
                     Err(_) => Ok(()),
                 }
@@ -429,9 +429,9 @@ impl Player {
     }
 
     fn tell(&mut self) -> Result<(), Gone> {
-        self.told = Instant::now();
+        self.reported = Instant::now();
         let seconds = self.seconds();
-        let told = Told {
+        let progress = Progress {
             seconds,
             cycle: self.moment.cycle,
             time: self.moment.time,
@@ -439,7 +439,7 @@ impl Player {
             paused: self.is_paused,
             at_end: seconds >= self.recording.last().seconds,
         };
-        self.put(Wire::text(json!({ "play": told }).to_string()))
+        self.put(Wire::text(json!({ "play": progress }).to_string()))
     }
 }
 

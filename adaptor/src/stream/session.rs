@@ -16,11 +16,12 @@ use tombolo_pipelines::language::{
 };
 
 use super::{
-    CommandSink, PING_PERIOD, Shared,
+    CommandSink, PING_PERIOD,
     allowance::RATE,
     credentials::{Access, Holder},
     hub::Hub,
     outbox::{Client, Message},
+    routes::Shared,
     text::Text,
 };
 use crate::lock::lock;

@@ -6,8 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpStream;
 use tombolo_pipelines::language::Listen;
+
+use crate::client::Stream;
 
 /// Where a server listens, once it does.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,13 +43,19 @@ impl Socket {
     pub(super) fn bind(wanted: &Listen) -> io::Result<(Self, Place)> {
         match wanted {
             Listen::Address(address) => {
-                let socket = TcpListener::bind(address)?;
-                let address = socket.local_addr()?;
-                socket.set_nonblocking(true)?;
-                Ok((Self::Tcp(socket), Place::Address(address)))
+                let (socket, address) = Self::bind_address(*address)?;
+                Ok((socket, Place::Address(address)))
             }
             Listen::Socket(path) => bind_path(path),
         }
+    }
+
+    /// Listens on an address of the network.
+    pub(super) fn bind_address(address: SocketAddr) -> io::Result<(Self, SocketAddr)> {
+        let socket = TcpListener::bind(address)?;
+        let address = socket.local_addr()?;
+        socket.set_nonblocking(true)?;
+        Ok((Self::Tcp(socket), address))
     }
 
     /// The same socket, for the server's runtime.
@@ -108,11 +116,6 @@ pub(super) enum Listening {
     Unix(tokio::net::UnixListener),
 }
 
-/// A connection of either kind.
-pub(super) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
-
-impl<S: AsyncRead + AsyncWrite + Send + Unpin> Stream for S {}
-
 /// A connection, its number in the system, and the address that it comes from: the machine's own for
 /// one through a path.
 pub(super) struct Accepted {
@@ -134,13 +137,7 @@ impl Listening {
         match self {
             Self::Tcp(socket) => {
                 let (stream, address) = socket.accept().await?;
-                // Small messages (an order's outcome) do not wait for more bytes, and little lies in
-                // the system's buffers. A socket that cannot be told so works too.
-                let _ = stream.set_nodelay(true);
-                let settings = socket2::SockRef::from(&stream);
-                let _ = settings.set_send_buffer_size(SEND_BUFFER);
-                #[cfg(target_os = "linux")]
-                let _ = settings.set_tcp_notsent_lowat(UNSENT);
+                hold_little(&stream);
                 Ok(Accepted {
                     #[cfg(unix)]
                     descriptor: std::os::fd::AsRawFd::as_raw_fd(&stream),
@@ -160,4 +157,14 @@ impl Listening {
             }
         }
     }
+}
+
+/// Small messages (an order's outcome) do not wait for more bytes, and little lies in the system's
+/// buffers. A socket that cannot be set so works too.
+pub(super) fn hold_little(stream: &TcpStream) {
+    let _ = stream.set_nodelay(true);
+    let settings = socket2::SockRef::from(stream);
+    let _ = settings.set_send_buffer_size(SEND_BUFFER);
+    #[cfg(target_os = "linux")]
+    let _ = settings.set_tcp_notsent_lowat(UNSENT);
 }

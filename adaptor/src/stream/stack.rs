@@ -17,14 +17,14 @@ pub(super) type Visit = dyn Fn(usize, &mut dyn FnMut(&Edit) -> bool) + Send + Sy
 
 /// The stack of edits as it is now.
 #[derive(Clone, Default)]
-pub(super) struct ToldStack {
+pub(super) struct ReportedStack {
     revision: u64,
     edits: usize,
     undoable: usize,
     visit: Option<Arc<Visit>>,
 }
 
-/// A change of the stack that a viewer is yet to be told of.
+/// A change of the stack that a viewer has yet to hear of.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StackChange {
     revision: u64,
@@ -36,7 +36,7 @@ pub(crate) struct StackChange {
 }
 
 impl StackChange {
-    /// This change after another that was not told.
+    /// This change after another that was not sent.
     pub(super) fn after(self, earlier: Option<Self>) -> Self {
         let kept = earlier.map_or(self.kept, |earlier| earlier.kept.min(self.kept));
         Self { kept, ..self }
@@ -56,7 +56,7 @@ impl StackChange {
     }
 }
 
-impl ToldStack {
+impl ReportedStack {
     /// The stack after a change, and what viewers are told of it: so many edits, of which the first
     /// `kept` are those of before, and so many orders that can be taken back.
     pub(super) fn changed(
@@ -121,21 +121,21 @@ struct Recorded<E> {
 }
 
 /// What viewers are told of a stack that was recorded. Its place in the recording is its revision.
-pub(super) fn told(revision: u64, text: &str) -> serde_json::Result<StackChange> {
+pub(super) fn recorded_change(revision: u64, text: &str) -> serde_json::Result<StackChange> {
     let Recorded::<IgnoredAny> { stack } = serde_json::from_str(text)?;
     let WholeStack { kept, undoable, edits } = stack;
     Ok(StackChange { revision, edits: edits.len(), kept, undoable })
 }
 
 /// The edits of a stack that was recorded, from one on.
-pub(super) fn recorded(revision: u64, text: &str, from: usize) -> serde_json::Result<Answer> {
+pub(super) fn recorded_edits(revision: u64, text: &str, from: usize) -> serde_json::Result<Answer> {
     let Recorded::<Edit> { stack } = serde_json::from_str(text)?;
     let WholeStack { undoable, edits, .. } = stack;
     let count = edits.len();
     let visit = move |from: usize, next: &mut dyn FnMut(&Edit) -> bool| {
         let _all = edits.iter().skip(from).all(next);
     };
-    let stack = ToldStack { revision, edits: count, undoable, visit: Some(Arc::new(visit)) };
+    let stack = ReportedStack { revision, edits: count, undoable, visit: Some(Arc::new(visit)) };
     Ok(stack.answer(from))
 }
 

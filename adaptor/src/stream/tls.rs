@@ -1,7 +1,13 @@
 //! How a server is known, where its connections are encrypted: by a certificate from files, or by one
 //! that is made for the run.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    fs::OpenOptions,
+    io::{Read, Write},
+    net::SocketAddr,
+    path::Path,
+    sync::Arc,
+};
 
 use rustls::{
     ServerConfig,
@@ -13,9 +19,9 @@ use rustls::{
     version::TLS13,
 };
 use tokio_rustls::TlsAcceptor;
-use tombolo_pipelines::language::Tls;
+use tombolo_pipelines::language::{StreamServer, Tls};
 
-use super::{StreamError, credentials::open_private};
+use super::{StreamError, credentials::open_private, socket::Place};
 use crate::fingerprint::fingerprint;
 
 /// The certificate of a server, with its key.
@@ -51,6 +57,63 @@ impl Identity {
         }
     }
 
+    /// The certificate that is kept in a directory, which is made for these names where it is missing.
+    pub(super) fn kept(directory: &Path, names: Vec<String>) -> Result<Self, StreamError> {
+        let [certificate, key] = ["certificate.der", "key.der"].map(|file| directory.join(file));
+        let wrong = |path: &Path, reason: &str| {
+            StreamError::Tls(format!("{}: {reason}", path.display()))
+        };
+        if !key.exists() {
+            let made = rcgen::generate_simple_self_signed(names)
+                .map_err(|error| StreamError::Tls(error.to_string()))?;
+            let write = |path: &Path, bytes: &[u8]| {
+                let mut options = OpenOptions::new();
+                options.write(true).create(true).truncate(true);
+                #[cfg(unix)]
+                std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+                let written = options.open(path).and_then(|mut file| file.write_all(bytes));
+                written.map_err(|error| wrong(path, &error.to_string()))
+            };
+            // The key last: where it is there, the certificate is.
+            write(&certificate, made.cert.der())?;
+            write(&key, &made.signing_key.serialize_der())?;
+        }
+        let chain = std::fs::read(&certificate)
+            .map_err(|error| wrong(&certificate, &error.to_string()))?;
+        let mut bytes = Vec::new();
+        let mut file = open_private(&key).map_err(StreamError::Tls)?;
+        file.read_to_end(&mut bytes).map_err(|error| wrong(&key, &error.to_string()))?;
+        Self::with(vec![chain.into()], PrivateKeyDer::Pkcs8(bytes.into()))
+    }
+
+    /// The certificate of a server, where its connections are to be encrypted: always where others than
+    /// this machine reach it, unless that was expressly not wanted.
+    pub(super) fn of_server(
+        settings: &StreamServer,
+        place: &Place,
+    ) -> Result<Option<Self>, StreamError> {
+        let wrong = |reason: &str| Err(StreamError::Tls(reason.into()));
+        let address = match (place, &settings.tls, settings.insecure) {
+            (_, Some(_), true) => return wrong("`insecure` says that nothing is encrypted"),
+            (Place::Socket(_), Some(_), _) => {
+                return wrong("what goes through a socket at a path never leaves the machine");
+            }
+            (Place::Socket(_), None, _) => return Ok(None),
+            (Place::Address(address), _, _) => address,
+        };
+        let is_open = !address.ip().is_loopback();
+        if settings.tls.is_none() && (!is_open || settings.insecure) {
+            if is_open {
+                log::warn!(
+                    "viewers reach {address} from other machines, and what they send and see can be \
+                     read on the way, because `stream.insecure` says so"
+                );
+            }
+            return Ok(None);
+        }
+        Self::of(&settings.tls.clone().unwrap_or_default(), names_of(*address)).map(Some)
+    }
+
     fn with(
         chain: Vec<CertificateDer<'static>>,
         key: PrivateKeyDer<'static>,
@@ -63,4 +126,18 @@ impl Identity {
             .map_err(|error| StreamError::Tls(error.to_string()))?;
         Ok(Self { acceptor: Arc::new(config).into(), fingerprint })
     }
+}
+
+/// The names and addresses by which a server that listens there is reached.
+pub(super) fn names_of(address: SocketAddr) -> Vec<String> {
+    let names = [Some("localhost".to_owned()), machine(), Some(address.ip().to_string())];
+    names.into_iter().flatten().collect()
+}
+
+/// The machine's name in its network, as far as the system tells it.
+pub(super) fn machine() -> Option<String> {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").ok()?;
+    let name = name.trim();
+    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '.';
+    (!name.is_empty() && name.chars().all(is_name)).then(|| name.to_owned())
 }

@@ -433,8 +433,8 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
         config.stream = None;
     } else {
         let server = config.stream.get_or_insert_with(StreamServer::default);
-        if let Some(listen) = &options.listen {
-            server.listen.clone_from(listen);
+        if options.listen.is_some() {
+            server.listen.clone_from(&options.listen);
         }
     }
     Ok(config)

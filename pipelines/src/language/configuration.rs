@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::pipeline::{Due, Pipeline};
+use super::relay_address::{RelayAddress, RunName};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -69,9 +70,22 @@ impl Config {
 pub struct StreamServer {
     /// The address and port to listen on, where port 0 takes any free one, or `unix:/PATH` for a
     /// socket that its owner alone can connect to. Anything but a loopback address is open to the
-    /// network, and encrypted.
-    #[schemars(with = "String")]
-    pub listen: Listen,
+    /// network, and encrypted. Left out, it is `127.0.0.1:7070`, or where `connect` is given nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub listen: Option<Listen>,
+    /// The relay to connect to, through which viewers reach the run: `HOST:PORT`, or
+    /// `HOST:PORT#sha256=FINGERPRINT` where its certificate is known by that. The relay's secret for
+    /// runs is `relay` in the file that `secrets` names, or `TOMBOLO_RELAY_SECRET`. While it is not
+    /// reached the run goes on, and it is tried again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub connect: Option<RelayAddress>,
+    /// The run's name at the relay: 1 to 48 letters, digits, `-`, `_` or `.`. Left out, it is that of
+    /// its machine. Where another run has it, a number is put behind it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub name: Option<RunName>,
     /// The encryption of connections. An address that is not loopback always has it; left out, its
     /// certificate is made for the run.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -84,8 +98,8 @@ pub struct StreamServer {
     /// is made for each run. A file that others can read is no place for it: see `secrets`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub token: Option<String>,
-    /// A file with the secrets, `{"drive": "...", "watch": "..."}` or one of them, that only its
-    /// owner can read (mode 0600). The environment variables `TOMBOLO_DRIVING_SECRET` and
+    /// A file with the secrets, `{"drive": "...", "watch": "...", "relay": "..."}` or some of them, that
+    /// only its owner can read (mode 0600). The environment variables `TOMBOLO_DRIVING_SECRET` and
     /// `TOMBOLO_WATCHING_SECRET` go before it; those that nothing gives are made for each run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub secrets: Option<String>,
@@ -96,13 +110,24 @@ pub struct StreamServer {
 impl Default for StreamServer {
     fn default() -> Self {
         Self {
-            listen: Listen::Address(SocketAddr::from(([127, 0, 0, 1], 7070))),
+            listen: None,
+            connect: None,
+            name: None,
             tls: None,
             insecure: false,
             token: None,
             secrets: None,
             limits: StreamLimits::default(),
         }
+    }
+}
+
+impl StreamServer {
+    /// The place that it listens on, if it does.
+    #[must_use]
+    pub fn place(&self) -> Option<Listen> {
+        let usual = || Listen::Address(SocketAddr::from(([127, 0, 0, 1], 7070)));
+        self.listen.clone().or_else(|| self.connect.is_none().then(usual))
     }
 }
 

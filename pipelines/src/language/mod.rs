@@ -45,6 +45,7 @@ mod pipeline_change;
 mod probe;
 mod reductions;
 mod relative_files;
+mod relay_address;
 mod render;
 mod scan;
 mod sinks;
@@ -91,6 +92,7 @@ pub use reductions::{
     TimeStatistics, Viscosity, WallShearStress, Weight,
 };
 pub use relative_files::resolve_files;
+pub use relay_address::{RelayAddress, RunName};
 pub use render::{Color, ColorMap, Component, Render, Shading};
 pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};

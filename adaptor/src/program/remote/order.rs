@@ -9,7 +9,7 @@ use std::{
 
 use crate::{
     OrderReport, OrderStatus,
-    client::{Client, Event, Foretold, Told},
+    client::{Client, Event, Foretold, Received},
     deform::{edit::Edit, shape::Outcome},
     pipelines::{
         files::read_displacements,
@@ -86,7 +86,7 @@ pub(crate) fn forecast(options: &ForecastOptions) -> Result<(), Failure> {
                     print(forecast)?;
                 }
                 return match (forecast.order.outcome, options.target.json) {
-                    (Outcome::Rejected, true) => Err(Failure::Told),
+                    (Outcome::Rejected, true) => Err(Failure::Reported),
                     (Outcome::Rejected, false) => {
                         Err(Failure::Wrong("the order would be rejected".into()))
                     }
@@ -167,7 +167,7 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
             OrderStatus::Rejected => {
                 let reason = report.reason.clone().unwrap_or_else(|| "no reason given".into());
                 return Err(if as_json {
-                    Failure::Told
+                    Failure::Reported
                 } else {
                     Failure::Wrong(format!("rejected: {reason}"))
                 });
@@ -178,7 +178,7 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
     }
 }
 
-fn next(client: &Client, patience: Duration) -> Result<Told, Failure> {
+fn next(client: &Client, patience: Duration) -> Result<Received, Failure> {
     let told = client.next(patience).map_err(failed)?;
     told.ok_or_else(|| Failure::Wrong(format!("no answer within {} seconds", patience.as_secs())))
 }

@@ -1,0 +1,212 @@
+//! How a person gets into a run: by a link that works once on a terminal, by a file that only its owner
+//! can read anywhere else.
+
+use std::{
+    fs::OpenOptions,
+    io::{self, Write},
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex},
+};
+
+use super::{
+    connect::Connect,
+    credentials::{Access, Credentials},
+    relay::messages::Attached,
+    socket::Place,
+    tls::machine,
+};
+use crate::lock::lock;
+
+/// A file with links, which goes with the server that they lead to.
+pub(super) struct LinkFile(PathBuf);
+
+impl LinkFile {
+    pub(super) fn write(path: PathBuf, text: &str) -> io::Result<Self> {
+        // A new file, so that neither a link that lies there nor another's permissions count.
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let mut options = OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let mut file = options.open(&path)?;
+        let links = Self(path);
+        file.write_all(text.as_bytes())?;
+        Ok(links)
+    }
+}
+
+impl Drop for LinkFile {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// The links of a run.
+pub(super) struct Links {
+    /// Where its server listens, if it does.
+    pub(super) place: Option<Place>,
+    /// SHA-256 of its certificate, where connections to it are encrypted.
+    pub(super) fingerprint: Option<String>,
+    pub(super) credentials: Arc<Credentials>,
+    /// The relay that it connects to, which its links lead through.
+    pub(super) relay: Option<Arc<Connect>>,
+    pub(super) file: Mutex<Option<LinkFile>>,
+}
+
+/// Where a link leads, but for its secret.
+enum Way {
+    Socket(PathBuf),
+    /// An address with a slash at its end, and what is known of the certificate there.
+    Address {
+        address: String,
+        sha256: Option<String>,
+    },
+}
+
+impl Links {
+    /// The link for some rights, with their secret.
+    pub(super) fn link(&self, access: Access) -> String {
+        self.way().link("token", self.credentials.secret(access).as_str())
+    }
+
+    /// A link that opens one browser, once, for driving; `None` where the system has no random
+    /// numbers.
+    pub(super) fn browser_link(&self) -> Option<String> {
+        let key = self.credentials.key(Access::Drive).ok()?;
+        Some(self.way().link("key", key.as_str()))
+    }
+
+    fn way(&self) -> Way {
+        match (&self.relay, &self.place) {
+            (Some(relay), _) => {
+                let Attached { address, sha256, .. } = relay.attached();
+                Way::Address { address, sha256 }
+            }
+            (None, Some(place)) => self.local(place),
+            // A server listens or connects.
+            (None, None) => Way::Address { address: String::new(), sha256: None },
+        }
+    }
+
+    /// The way past a relay.
+    fn local(&self, place: &Place) -> Way {
+        match place {
+            Place::Socket(path) => Way::Socket(path.clone()),
+            Place::Address(address) => {
+                let sha256 = self.fingerprint.clone();
+                let scheme = if sha256.is_some() { "https" } else { "http" };
+                Way::Address { address: format!("{scheme}://{}/", authority(*address)), sha256 }
+            }
+        }
+    }
+
+    /// The lines of the file: the links through a relay first, then those past it.
+    fn lines(&self) -> String {
+        let local = match (&self.relay, &self.place) {
+            (Some(_), Some(place)) => Some(self.local(place)),
+            _ => None,
+        };
+        let mut lines = String::new();
+        for way in std::iter::once(self.way()).chain(local) {
+            for (name, access) in [("drive", Access::Drive), ("watch", Access::Watch)] {
+                let secret = self.credentials.secret(access);
+                lines += &format!("{name}: {}\n", way.link("token", secret.as_str()));
+            }
+        }
+        lines
+    }
+
+    /// The name of the file: the port, that of the socket, or that at the relay.
+    fn called(&self) -> String {
+        match (&self.place, &self.relay) {
+            (Some(Place::Address(address)), _) => address.port().to_string(),
+            (Some(Place::Socket(path)), _) => {
+                path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+            }
+            (None, Some(relay)) => relay.attached().name.to_string(),
+            (None, None) => "run".into(),
+        }
+    }
+
+    /// Writes the links of the run into a directory, and says how to open it. Only to a terminal is
+    /// a link itself told: what is printed elsewhere others may read.
+    pub(super) fn invitation(&self, directory: &Path, terminal: bool) -> io::Result<String> {
+        std::fs::create_dir_all(directory)?;
+        let path = directory.join(format!("tombolo-{}.link", self.called()));
+        self.write(path.clone())?;
+        // Whoever reads it may stand elsewhere.
+        let path = std::path::absolute(&path).unwrap_or(path);
+        let path = path.display();
+        let certificate = self.fingerprint.as_ref().map_or_else(String::new, |fingerprint| {
+            format!(
+                "\nits certificate has the SHA-256 fingerprint {}",
+                with_colons(fingerprint)
+            )
+        });
+        let invitation = match self.browser_link().filter(|_| terminal) {
+            Some(link) => format!(
+                "open {link}\nIt opens one browser, once; links for others, and to watch only, are in {path}"
+            ),
+            None => format!("the links to this run are in {path}"),
+        };
+        let waits = match &self.relay {
+            Some(relay) if !relay.is_connected() => {
+                format!("\nthey work once the relay {} is reached", relay.address())
+            }
+            _ => String::new(),
+        };
+        Ok(invitation + &waits + &certificate)
+    }
+
+    fn write(&self, path: PathBuf) -> io::Result<()> {
+        let lines = self.lines();
+        let mut file = lock(&self.file);
+        // First the old one goes, which may be the same file.
+        *file = None;
+        *file = Some(LinkFile::write(path, &lines)?);
+        Ok(())
+    }
+
+    /// Writes the file again, after the run has got another name at its relay.
+    pub(super) fn renew(&self) {
+        let path = lock(&self.file).as_ref().map(|file| file.0.clone());
+        if let Some(path) = path
+            && let Err(error) = self.write(path.clone())
+        {
+            log::warn!("the links were not written to {}: {error}", path.display());
+        }
+    }
+}
+
+impl Way {
+    fn link(&self, name: &str, secret: &str) -> String {
+        match self {
+            Self::Socket(path) => format!("unix:{}?{name}={secret}", path.display()),
+            Self::Address { address, sha256 } => {
+                format!("{address}?{name}={secret}{}", fragment(sha256.as_deref()))
+            }
+        }
+    }
+}
+
+/// The end of a link by which programs know a certificate. What stands behind the `#` no browser sends.
+pub(super) fn fragment(sha256: Option<&str>) -> String {
+    sha256.map_or_else(String::new, |digits| format!("#sha256={digits}"))
+}
+
+/// The host and port at which a server is reached that listens on an address: the machine's name where
+/// it listens on all.
+pub(super) fn authority(address: SocketAddr) -> String {
+    let host = machine().filter(|_| address.ip().is_unspecified());
+    host.map_or(address.to_string(), |name| format!("{name}:{}", address.port()))
+}
+
+/// A fingerprint as browsers show it.
+pub(super) fn with_colons(fingerprint: &str) -> String {
+    let pairs = (0..fingerprint.len() / 2).filter_map(|at| fingerprint.get(2 * at..2 * at + 2));
+    pairs.collect::<Vec<_>>().join(":")
+}
