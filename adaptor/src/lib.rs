@@ -49,6 +49,7 @@ mod changes;
 mod checkpoint;
 pub mod client;
 mod condition;
+mod dial;
 mod error;
 mod fingerprint;
 pub mod foreign;

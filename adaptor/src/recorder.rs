@@ -167,7 +167,9 @@ impl Writing {
                 }
                 Some(Observed::Behind(view)) => self.hub.want_key(view, EXACT),
                 Some(Observed::End) => return self.out.flush().map_err(|error| error.to_string()),
-                Some(Observed::TooMuch) => return Err("the disk is too slow for what viewers are sent".into()),
+                Some(Observed::TooMuch) => {
+                    return Err("the disk is too slow for what viewers are sent".into());
+                }
                 None => {
                     self.out.flush().map_err(|error| error.to_string())?;
                     self.observer.wait(PERIOD);

@@ -207,6 +207,89 @@ fn steer_again(run: &Run) {
     client.wait_for_status(PATIENCE, |_| true).expect("it goes on");
 }
 
+/// nginx, as a process of its own.
+struct Proxy(std::process::Child);
+
+impl Proxy {
+    /// Serves at a port with the part of a configuration that the documentation prints.
+    fn start(directory: &Path, port: u16, location: &str) -> Self {
+        let place = directory.display();
+        let temporary: String = ["client_body", "proxy", "fastcgi", "uwsgi", "scgi"]
+            .map(|kind| format!("{kind}_temp_path {place}/{kind};\n"))
+            .concat();
+        let text = format!(
+            "user root;\ndaemon off;\npid {place}/pid;\nerror_log {place}/error.log;\nevents {{}}\n\
+             http {{\naccess_log off;\n{temporary}server {{\nlisten 127.0.0.1:{port};\n{location}\n}}\n}}\n"
+        );
+        let file = directory.join("nginx.conf");
+        std::fs::write(&file, text).expect("written");
+        let mut command = std::process::Command::new("/usr/sbin/nginx");
+        let child = command.arg("-e").arg(directory.join("error.log")).arg("-c").arg(file).spawn();
+        Self(child.expect("nginx, which scripts/setup installs"))
+    }
+}
+
+impl Drop for Proxy {
+    fn drop(&mut self) {
+        // So that its workers end too.
+        let _ = std::process::Command::new("kill").arg(self.0.id().to_string()).status();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn behind_nginx_as_the_documentation_sets_it_up_a_run_is_steered_under_a_prefix() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/operations.md");
+    let page = std::fs::read_to_string(page).expect("read");
+    let (_, rest) = page.split_once("```nginx\n").expect("a configuration");
+    let (location, _) = rest.split_once("```").expect("its end");
+    let directory = tempfile::tempdir().expect("a directory");
+    let socket = directory.path().join("nozzle.sock");
+    let printed = "/run/tombolo/nozzle.sock";
+    assert!(location.contains(printed));
+    let location = location.replace(printed, &socket.display().to_string());
+    let run = Run::new(json!({"listen": format!("unix:{}", socket.display())}));
+    let free = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = free.local_addr().expect("an address").port();
+    drop(free);
+    let _proxy = Proxy::start(directory.path(), port, &location);
+    let begun = Instant::now();
+    while TcpStream::connect(("127.0.0.1", port)).is_err() {
+        assert!(begun.elapsed() < PATIENCE, "nginx does not listen");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let link = run.link.to_string();
+    let (_, token) = link.split_once("?token=").expect("a token");
+    let link = format!("http://127.0.0.1:{port}/runs/nozzle/?token={token}");
+    steer(&link.parse().expect("a link"));
+    // A browser is given a cookie for what is below the prefix, and comes by the name of the proxy.
+    let ask = |path: &str, more: &str| {
+        let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("connected");
+        let request = format!(
+            "GET {path} HTTP/1.1\r\nHost: localhost:{port}\r\nConnection: close\r\n{more}\r\n"
+        );
+        stream.write_all(request.as_bytes()).expect("sent");
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).expect("an answer");
+        String::from_utf8_lossy(&answer).into_owned()
+    };
+    let traded = ask(&format!("/runs/nozzle/?token={token}"), "");
+    assert!(traded.starts_with("HTTP/1.1 303"), "{traded}");
+    let cookie = traded.lines().find_map(|line| line.strip_prefix("set-cookie: "));
+    let cookie =
+        cookie.or_else(|| traded.lines().find_map(|line| line.strip_prefix("Set-Cookie: ")));
+    let cookie = cookie.expect("a cookie").split(';').next().expect("a pair").to_owned();
+    assert!(
+        cookie.starts_with(&format!("tombolo-{port}=")) && !traded.contains("Path="),
+        "{traded}"
+    );
+    let cookie = format!("Cookie: {cookie}\r\n");
+    assert!(ask("/runs/nozzle/stack", &cookie).starts_with("HTTP/1.1 200"));
+    assert!(ask("/runs/nozzle/stack", "").starts_with("HTTP/1.1 401"));
+    let foreign = format!("{cookie}Origin: http://evil.example\r\n");
+    assert!(ask("/runs/nozzle/stack", &foreign).starts_with("HTTP/1.1 403"));
+}
+
 #[test]
 fn who_shakes_no_hands_keeps_nobody_out() {
     let run = Run::new(json!({"listen": "127.0.0.1:0", "tls": {}}));

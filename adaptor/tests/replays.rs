@@ -47,7 +47,7 @@ fn random_message(random: &mut Random, sent: u64) -> Value {
     let amount = 0.05 + 0.01 * random.below(25) as f64;
     let schedule = json!({"steps": 1 + random.below(5), "every": {"steps": 1 + random.below(4)}});
     let id = format!("m{sent}");
-    match random.below(12) {
+    match random.below(14) {
         0 => json!({"id": id, "order": {"undo": 1 + random.below(2), "schedule": schedule}}),
         1 => json!({"id": id, "order": {"stack": squeeze(amount)["edits"], "schedule": schedule}}),
         2 => json!({"id": id, "cancel": {"order": format!("m{}", random.below(sent + 1))}}),
@@ -61,6 +61,10 @@ fn random_message(random: &mut Random, sent: u64) -> Value {
                     "stages": [{"schedule": schedule}]}]}}),
         7 => json!({"id": id, "pause": {}}),
         8 => json!({"id": id, "order": squeeze(amount)}),
+        9 | 10 => {
+            json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule,
+                         "replaces": format!("m{}", random.below(sent + 1))}})
+        }
         _ => json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule}}),
     }
 }
@@ -174,6 +178,62 @@ fn what_waits_at_the_end_is_not_carried_out_again() {
     let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
     let again = replay(&journal, usize::try_from(cycles).unwrap() + 10);
     assert!(again.last().unwrap().0 == mesh, "{journal}");
+}
+
+#[test]
+fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(settings(output.path()));
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let mut trace = Trace::new();
+    let order = |id: &str, by: f64, replaces: Option<&str>| {
+        let mut message = json!({"id": id, "order": squeeze(by)});
+        if let Some(other) = replaces {
+            message["order"]["replaces"] = other.into();
+        }
+        message
+    };
+    // The first moves the mesh for long; the others wait behind it.
+    let mut first = order("first", 0.1, None);
+    first["order"]["schedule"] = json!({"steps": 40, "every": {"steps": 2}});
+    viewer.send(&first);
+    let moves = |order: &Value| order["id"] == "first" && order["status"] == "applying";
+    while viewer.look_for("order", std::time::Duration::from_millis(2), moves).is_none() {
+        step(&mut solver, &mut trace);
+    }
+    viewer.send(&order("second", 0.2, None));
+    viewer.send(&order("third", 0.01, None));
+    for id in ["second", "third"] {
+        viewer.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
+    }
+    step(&mut solver, &mut trace);
+    viewer.send(&order("better", 0.05, Some("second")));
+    viewer.send(&order("late", 0.3, Some("first")));
+    viewer.send(&order("lost", 0.3, Some("nobody")));
+    let is_over = |order: &Value| order["status"] == "applied" || order["status"] == "rejected";
+    let mut ended = std::collections::BTreeMap::new();
+    while ended.len() < 6 {
+        step(&mut solver, &mut trace);
+        let wait = std::time::Duration::from_millis(1);
+        while let Some(order) = viewer.look_for("order", wait, is_over) {
+            ended.insert(order["id"].as_str().unwrap().to_owned(), order);
+        }
+        assert!(trace.len() < 20_000, "{ended:?}");
+    }
+    let reason = |id: &str| ended[id]["reason"].as_str().unwrap_or_default();
+    assert!(reason("second").contains("replaced by order better by c1"), "{ended:?}");
+    assert!(reason("late").contains("moves the mesh already"), "{ended:?}");
+    assert!(reason("lost").contains("there is no order 'nobody'"), "{ended:?}");
+    let cycle = |id: &str| ended[id]["cycle_applied"].as_u64().unwrap_or_else(|| panic!("{id}"));
+    assert!(cycle("first") < cycle("better") && cycle("better") <= cycle("third"), "{ended:?}");
+    for _ in 0..10 {
+        step(&mut solver, &mut trace);
+    }
+    solver.finish();
+    let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+    let again = replay(&journal, trace.len());
+    assert!(again == trace, "the replay differs");
 }
 
 #[test]

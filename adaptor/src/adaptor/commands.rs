@@ -191,9 +191,13 @@ impl Adaptor {
             Command::Order(order) => {
                 let background = self.config.steering.background
                     && matches!(source, Source::Viewer(_) | Source::Earlier(_, false));
+                let index = match self.make_way(&order, &id, source, moment) {
+                    Ok(index) => index,
+                    Err(reason) => return self.log.reject(&id, moment, &reason.into()),
+                };
                 match &mut self.mesh {
                     SteeredMesh::Steered(steerer, _) => {
-                        steerer.take(id, order, background, reservation);
+                        steerer.take(id, order, background, reservation, index);
                     }
                     SteeredMesh::Refused(reason) => self.log.reject(&id, moment, &reason.into()),
                     SteeredMesh::Unknown | SteeredMesh::Unsteered => {
@@ -232,26 +236,46 @@ impl Adaptor {
 
     /// Takes an order back that has not begun to move the mesh.
     fn cancel(&mut self, order: &str, source: &Source, moment: Moment) -> Result<(), String> {
-        let by = match source {
-            Source::Viewer(client) => format!(" by {}", Hub::name(*client)),
-            _ => String::new(),
-        };
-        let cancelled = match &mut self.mesh {
-            SteeredMesh::Steered(steerer, _) => steerer.cancel(order),
+        self.withdraw(order)?;
+        let reason = format!("cancelled{}", by(source));
+        self.log.reject(order, moment, &reason.into());
+        Ok(())
+    }
+
+    /// Takes the order back that another one replaces, and returns its place in the queue.
+    fn make_way(
+        &mut self,
+        order: &Order,
+        id: &str,
+        source: &Source,
+        moment: Moment,
+    ) -> Result<Option<usize>, String> {
+        let Some(replaced) = &order.replaces else { return Ok(None) };
+        // In a run that is carried out again the other one is gone already.
+        let may_be_gone = self.is_replay || matches!(source, Source::Earlier(..));
+        match self.withdraw(replaced) {
+            Ok(index) => {
+                let reason = format!("replaced by order {id}{}", by(source));
+                self.log.reject(replaced, moment, &reason.into());
+                Ok(Some(index))
+            }
+            Err(_) if may_be_gone => Ok(None),
+            Err(reason) => Err(reason),
+        }
+    }
+
+    /// Takes an order out of the queue, whatever then becomes of it; the error says why it cannot be.
+    fn withdraw(&mut self, order: &str) -> Result<usize, String> {
+        let withdrawn = match &mut self.mesh {
+            SteeredMesh::Steered(steerer, _) => steerer.withdraw(order),
             _ => None,
         };
-        match cancelled {
-            Some(Ok(())) => {
-                self.log.reject(order, moment, &format!("cancelled{by}").into());
-                Ok(())
-            }
-            Some(Err(reason)) => Err(reason),
-            None if self.communicator.rank() > 0 => Ok(()),
-            None if self.log.has_order(order) => {
-                Err(format!("order '{order}' waits no more, so that it cannot be cancelled"))
-            }
-            None => Err(format!("there is no order '{order}'")),
-        }
+        withdrawn.unwrap_or_else(|| {
+            Err(match self.log.has_order(order) {
+                true => format!("order '{order}' waits no more, so that it cannot be taken back"),
+                false => format!("there is no order '{order}'"),
+            })
+        })
     }
 
     /// Notes what became of a command that is no order, and tells who gave it.
@@ -267,6 +291,14 @@ impl Adaptor {
         }
         self.log.settle(id, source, moment, outcome);
         self.tell_conditions();
+    }
+}
+
+/// Names the viewer that a command came from.
+fn by(source: &Source) -> String {
+    match source {
+        Source::Viewer(client) => format!(" by {}", Hub::name(*client)),
+        _ => String::new(),
     }
 }
 

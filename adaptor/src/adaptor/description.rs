@@ -48,7 +48,8 @@ impl Adaptor {
         };
         let (before, edits) = (self.reported_stack.count(), now.count());
         let kept = self.reported_stack.shared(now);
-        let is_same = (before, edits) == (kept, kept) && self.reported_stack.orders() == now.orders();
+        let is_same =
+            (before, edits) == (kept, kept) && self.reported_stack.orders() == now.orders();
         if is_same {
             return;
         }

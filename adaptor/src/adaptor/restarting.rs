@@ -42,7 +42,7 @@ pub(super) struct Resumed {
 struct Again {
     commands: VecDeque<CommandAgain>,
     /// The commands that changed nothing, and why.
-    rejected: Vec<(String, String)>,
+    rejected: Vec<(SavedCommand, String)>,
     shapes: Vec<HandedShape>,
     /// The last cycle of which the journal tells.
     until: Option<u64>,
@@ -173,7 +173,7 @@ impl Again {
             );
             let (cycle, comes_late, has_settled) = match outcome {
                 Outcome::Rejected { reason, .. } => {
-                    again.rejected.push((id, reason));
+                    again.rejected.push((SavedCommand { id, by, command }, reason));
                     continue;
                 }
                 Outcome::Applied { cycle, comes_late } => (cycle, comes_late, true),
@@ -254,11 +254,17 @@ impl Adaptor {
         if self.communicator.rank() > 0 {
             return;
         }
-        for (id, reason) in &self.resumed.again.rejected {
+        for (SavedCommand { id, by, command }, reason) in &self.resumed.again.rejected {
             self.log.reserve(id);
-            if self.log.has_order(id) {
-                self.log.reject(id, self.moment, &reason.into());
+            if !matches!(command, Command::Order(_)) {
+                continue;
             }
+            // One that came in after the checkpoint is in the report and the journal of this run too.
+            if !self.log.has_order(id) {
+                let source = Source::Earlier(by.clone(), true);
+                self.log.accept_again(id, &source, command, self.moment);
+            }
+            self.log.reject(id, self.moment, &reason.into());
         }
         self.resumed.again.commands.iter().for_each(|command| self.log.reserve(&command.id));
     }

@@ -108,8 +108,11 @@ impl Adaptor {
         let fields = channel.fields.iter().map(
             |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
         );
-        let mut described =
-            Described { channel: channel.name.to_owned(), fields: fields.collect(), ..Described::default() };
+        let mut described = Described {
+            channel: channel.name.to_owned(),
+            fields: fields.collect(),
+            ..Described::default()
+        };
         if let SteeredMesh::Steered(steerer, Some(surface)) = &self.mesh {
             described.features = features(surface, &self.conditions);
             if let Some(unknown) = unknown_conditions(surface, &self.conditions) {

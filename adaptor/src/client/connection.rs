@@ -17,9 +17,10 @@ use tombolo_pipelines::{encode::Decoder, limits::DOCUMENT};
 
 use super::{
     ClientError, Event, Link, Options,
-    get::{Stream, not_tombolo, open, refused, shown},
+    get::{not_tombolo, open, refused, shown},
     state::Shared,
 };
+use crate::dial::Stream;
 
 /// How long a server may take to answer the request for a WebSocket, and to say hello then.
 const HELLO: Duration = Duration::from_secs(20);

@@ -1,19 +1,15 @@
 //! One request for what a run serves beside its WebSocket.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::{path::Path, time::Duration};
 
-use rustls::pki_types::ServerName;
 use tokio::{
-    io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt},
-    net::TcpStream,
+    io::{AsyncReadExt, AsyncWriteExt},
     time::timeout,
 };
-use tokio_rustls::TlsConnector;
 
-use super::{ClientError, Link, link::Way, tls};
+use super::{ClientError, Link, link::Way};
+use crate::dial::{DialError, Stream, dial};
 
-/// How long a host may take to take a connection.
-const CONNECT: Duration = Duration::from_secs(10);
 /// How long an answer may take as a whole. The first request for a surface has it encoded.
 const ANSWER: Duration = Duration::from_secs(120);
 /// Bytes that the head of an answer may have, and its headers.
@@ -28,17 +24,15 @@ pub(super) struct Answer {
     pub(super) body: Vec<u8>,
 }
 
-/// A connection of any kind.
-pub(crate) trait Stream: AsyncRead + AsyncWrite + Send + Unpin {}
-
-impl<S: AsyncRead + AsyncWrite + Send + Unpin> Stream for S {}
-
 /// Connects to where a link leads.
 pub(super) async fn open(link: &Link) -> Result<Box<dyn Stream>, ClientError> {
-    match link.way() {
-        Way::Plain | Way::Encrypted(_) => encrypt(link, open_address(link).await?).await,
-        Way::Socket(path) => open_path(link, path).await,
-    }
+    let certificate = match link.way() {
+        Way::Plain => None,
+        Way::Encrypted(pinned) => Some(pinned.as_deref()),
+        Way::Socket(path) => return open_path(link, path).await,
+    };
+    let dialled = dial(link.name(), link.port(), certificate).await;
+    dialled.map_err(|error| failed(link, error))
 }
 
 #[cfg(unix)]
@@ -59,48 +53,15 @@ async fn open_path(link: &Link, _: &Path) -> Result<Box<dyn Stream>, ClientError
     Err(ClientError::Unreachable { address: link.address(), reason })
 }
 
-/// Encrypts a connection where its link says so, and makes sure of the certificate.
-pub(crate) async fn encrypt(
-    link: &Link,
-    stream: TcpStream,
-) -> Result<Box<dyn Stream>, ClientError> {
-    let Way::Encrypted(pinned) = link.way() else { return Ok(Box::new(stream)) };
+/// A failure to connect, as the client says it.
+fn failed(link: &Link, error: DialError) -> ClientError {
     let address = link.address();
-    let certificate =
-        |reason: String| ClientError::Certificate { address: link.address(), reason };
-    let config = tls::config(pinned.as_deref()).map_err(|error| certificate(error.to_string()))?;
-    let name = ServerName::try_from(link.name().to_owned())
-        .map_err(|error| certificate(error.to_string()))?;
-    let shaken = TlsConnector::from(Arc::new(config)).connect(name, stream);
-    match timeout(CONNECT, shaken).await {
-        Ok(Ok(stream)) => Ok(Box::new(stream)),
-        Ok(Err(error)) => Err(certificate(error.to_string())),
-        Err(_) => Err(ClientError::Unreachable { address, reason: "it does not shake hands".into() }),
+    match error {
+        DialError::Unknown(reason) => ClientError::Unknown { host: link.host().into(), reason },
+        DialError::Refused => ClientError::Refused { address },
+        DialError::Unreachable(reason) => ClientError::Unreachable { address, reason },
+        DialError::Certificate(reason) => ClientError::Certificate { address, reason },
     }
-}
-
-/// The addresses that the system knows for a link's host, tried one after the other.
-pub(crate) async fn open_address(link: &Link) -> Result<TcpStream, ClientError> {
-    let unknown = |reason: String| ClientError::Unknown { host: link.host().into(), reason };
-    let addresses = tokio::net::lookup_host((link.name(), link.port())).await;
-    let mut failure = unknown("the system names none".into());
-    for address in addresses.map_err(|error| unknown(error.to_string()))? {
-        let unreachable =
-            |reason: String| ClientError::Unreachable { address: link.address(), reason };
-        failure = match timeout(CONNECT, TcpStream::connect(address)).await {
-            Ok(Ok(stream)) => {
-                // Small messages should not wait for more bytes; without it works too.
-                let _ = stream.set_nodelay(true);
-                return Ok(stream);
-            }
-            Ok(Err(error)) if error.kind() == std::io::ErrorKind::ConnectionRefused => {
-                ClientError::Refused { address: link.address() }
-            }
-            Ok(Err(error)) => unreachable(error.to_string()),
-            Err(_) => unreachable(format!("no answer within {} seconds", CONNECT.as_secs())),
-        };
-    }
-    Err(failure)
 }
 
 /// Asks for a path of a run, of whose answer no more than `most` bytes are read.

@@ -83,11 +83,11 @@ impl Link {
     }
 
     /// The host and port for a request's header.
-    pub(crate) fn authority(&self) -> String {
+    pub(super) fn authority(&self) -> String {
         format!("{}:{}", self.host, self.port)
     }
 
-    pub(crate) fn token(&self) -> &str {
+    pub(super) fn token(&self) -> &str {
         &self.token
     }
 

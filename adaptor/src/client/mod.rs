@@ -74,7 +74,6 @@ mod event;
 mod get;
 mod link;
 mod state;
-mod tls;
 
 use std::{
     sync::{
@@ -96,10 +95,9 @@ use tombolo_pipelines::{
 
 pub use error::ClientError;
 pub use event::{
-    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Precision, Role,
-    Received, StackChange, Status, StatusQuality, Values, View,
+    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Precision,
+    Received, Role, StackChange, Status, StatusQuality, Values, View,
 };
-pub(crate) use get::{Stream, encrypt, open_address};
 pub use link::Link;
 use state::{Pending, Shared};
 

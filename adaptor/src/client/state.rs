@@ -10,7 +10,7 @@ use std::{
 use tokio::sync::Notify;
 use tombolo_pipelines::encode::DecodedFrame;
 
-use super::{ClientError, End, Event, Hello, Role, Status, Received};
+use super::{ClientError, End, Event, Hello, Received, Role, Status};
 use crate::lock::lock;
 
 /// Texts that wait to be read, and their bytes; beyond either the oldest make way.

@@ -27,15 +27,14 @@ use super::{
     StreamError,
     connection::Way,
     credentials::relay_secret,
-    links::Links,
     listener::Entrance,
-    relay::messages::{ATTACH, Attach, Attached, CARRY, MESSAGE, Open, PROTOCOL, VERSION},
+    relay_messages::{ATTACH, Attach, Attached, CARRY, MESSAGE, Open, PROTOCOL, VERSION},
     secret::Secret,
     socket::{Accepted, hold_little},
     tls::machine,
 };
 use crate::{
-    client::{Link, Stream, encrypt, open_address},
+    dial::{Stream, connect, dial, encrypt},
     lock::lock,
 };
 
@@ -57,9 +56,9 @@ const ADDRESS: usize = 1024;
 
 /// A run's place at a relay.
 pub(super) struct Connect {
-    relay: RelayAddress,
-    /// The relay, with its secret for runs.
-    link: Link,
+    relay: Arc<RelayAddress>,
+    /// The relay's secret for runs.
+    secret: Secret,
     instance: Secret,
     state: Mutex<State>,
     changed: Condvar,
@@ -90,16 +89,13 @@ impl Connect {
             None => own_name(),
         };
         let scheme = if relay.is_encrypted() { "https" } else { "http" };
-        let pinned = relay.sha256().map_or_else(String::new, |digits| format!("#sha256={digits}"));
-        let base = format!("{scheme}://{}", relay.authority());
-        let link = format!("{base}/?token={}{pinned}", secret.as_str());
-        let link = link.parse().map_err(|_| StreamError::Relay("its address".into()))?;
-        let address = format!("{base}/{name}/");
+        let address = format!("{scheme}://{}/{name}/", relay.authority());
         let attached = Attached { name, address, sha256: relay.sha256().map(str::to_owned) };
         let instance = Secret::random().map_err(StreamError::Token)?;
         let state = State { attached, is_connected: false, is_given_up: false };
         let (state, changed) = (Mutex::new(state), Condvar::new());
-        Ok(Some(Arc::new(Self { relay: relay.clone(), link, instance, state, changed })))
+        let relay = Arc::new(relay.clone());
+        Ok(Some(Arc::new(Self { relay, secret, instance, state, changed })))
     }
 
     /// The address of the relay.
@@ -121,8 +117,9 @@ impl Connect {
         state.attached.clone()
     }
 
-    /// Keeps the connection for ever, with growing pauses where it cannot be made.
-    pub(super) async fn keep(&self, entrance: &Entrance, links: &Links) {
+    /// Keeps the connection for ever, with growing pauses where it cannot be made; calls `renamed` where
+    /// the relay gives the run another name or address.
+    pub(super) async fn keep(&self, entrance: &Entrance, renamed: impl Fn()) {
         let mut pause = FIRST_PAUSE;
         let mut is_reported = false;
         loop {
@@ -131,7 +128,7 @@ impl Connect {
                     log::info!("this run is {} at the relay {}", attached.name, self.relay);
                     let is_new = self.connected(&attached);
                     if is_new {
-                        links.renew();
+                        renamed();
                     }
                     let reason = self.serve(socket, &attached, entrance).await;
                     Lost { reason, was_connected: true }
@@ -167,18 +164,19 @@ impl Connect {
     /// Connects, and says who this run is; the error says why the relay does not take it.
     async fn join(&self) -> Result<(WebSocketStream<Box<dyn Stream>>, Attached), String> {
         let joining = async {
-            let stream = open_address(&self.link).await.map_err(|error| error.to_string())?;
-            let stream = encrypt(&self.link, stream).await.map_err(|error| error.to_string())?;
-            let address = format!("ws://{}{ATTACH}", self.link.authority());
+            let (host, port) = self.relay.host();
+            let dialled = dial(host, port, certificate(&self.relay)).await;
+            let stream = dialled.map_err(|error| error.to_string())?;
+            let address = format!("ws://{}{ATTACH}", self.relay.authority());
             let mut request = address.into_client_request().map_err(|error| error.to_string())?;
-            let bearer = HeaderValue::from_str(&format!("Bearer {}", self.link.token()));
+            let bearer = HeaderValue::from_str(&format!("Bearer {}", self.secret.as_str()));
             let bearer = bearer.map_err(|error| error.to_string())?;
             request.headers_mut().insert(header::AUTHORIZATION, bearer);
-            let limits =
-                WebSocketConfig::default().max_message_size(Some(MESSAGE)).max_frame_size(Some(MESSAGE));
-            let (mut socket, _) = client_async_with_config(request, stream, Some(limits))
-                .await
-                .map_err(refused)?;
+            let limits = WebSocketConfig::default()
+                .max_message_size(Some(MESSAGE))
+                .max_frame_size(Some(MESSAGE));
+            let (mut socket, _) =
+                client_async_with_config(request, stream, Some(limits)).await.map_err(refused)?;
             let wish = lock(&self.state).attached.name.clone();
             let attach =
                 Attach { version: VERSION, name: wish, instance: self.instance.as_str().into() };
@@ -197,9 +195,7 @@ impl Connect {
             let attached: Attached =
                 serde_json::from_str(&text).map_err(|_| "it is no relay".to_owned())?;
             // It stands in links, which people and programs are given.
-            let is_address = attached.address.len() <= ADDRESS
-                && format!("{}?token=x", attached.address).parse::<Link>().is_ok();
-            if !is_address {
+            if !is_address(&attached.address) {
                 return Err("it gives this run an address that none can have".into());
             }
             Ok((socket, attached))
@@ -233,9 +229,10 @@ impl Connect {
             };
             // One that asks for more than it lets in is not obeyed.
             if dials.len() < DIALS {
-                let (link, entrance) = (self.link.clone(), entrance.clone());
+                let (relay, secret) = (Arc::clone(&self.relay), self.secret.clone());
+                let entrance = entrance.clone();
                 dials.spawn(async move {
-                    match timeout(ANSWER, carry(&link, &open)).await {
+                    match timeout(ANSWER, carry(&relay, &secret, &open)).await {
                         Ok(Ok(accepted)) => entrance.take(accepted, way).await,
                         Ok(Err(reason)) => log::debug!("no connection for a viewer: {reason}"),
                         Err(_) => log::debug!("no connection for a viewer: the relay is silent"),
@@ -247,19 +244,21 @@ impl Connect {
 }
 
 /// Makes a connection for a viewer.
-async fn carry(link: &Link, open: &Open) -> Result<Accepted, String> {
+async fn carry(relay: &RelayAddress, secret: &Secret, open: &Open) -> Result<Accepted, String> {
     let failed = |error: std::io::Error| error.to_string();
-    let stream = open_address(link).await.map_err(|error| error.to_string())?;
+    let (host, port) = relay.host();
+    let stream = connect(host, port).await.map_err(|error| error.to_string())?;
     hold_little(&stream);
     #[cfg(unix)]
     let descriptor = std::os::fd::AsRawFd::as_raw_fd(&stream);
-    let mut stream = encrypt(link, stream).await.map_err(|error| error.to_string())?;
+    let encrypted = encrypt(stream, host, certificate(relay)).await;
+    let mut stream = encrypted.map_err(|error| error.to_string())?;
     let ticket = Secret::given(&open.ticket).ok_or("its ticket is none")?;
     let request = format!(
         "GET {CARRY}{} HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {}\r\nConnection: Upgrade\r\nUpgrade: {PROTOCOL}\r\n\r\n",
         ticket.as_str(),
-        link.authority(),
-        link.token()
+        relay.authority(),
+        secret.as_str()
     );
     stream.write_all(request.as_bytes()).await.map_err(failed)?;
     stream.flush().await.map_err(failed)?;
@@ -280,6 +279,21 @@ async fn carry(link: &Link, open: &Open) -> Result<Accepted, String> {
         descriptor,
         address: open.viewer,
     })
+}
+
+/// The certificate by which a relay is known, where connections to it are encrypted.
+fn certificate(relay: &RelayAddress) -> Option<Option<&str>> {
+    relay.is_encrypted().then(|| relay.sha256())
+}
+
+/// Whether a text can be the address of a run, with a slash at its end.
+fn is_address(text: &str) -> bool {
+    let is_plain = |c: char| c.is_ascii_graphic() && !"?#\"<>\\".contains(c);
+    let rest = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
+    text.len() <= ADDRESS
+        && text.chars().all(is_plain)
+        && text.ends_with('/')
+        && rest.is_some_and(|rest| !rest.starts_with('/'))
 }
 
 /// Why a relay does not let a run in.
@@ -322,6 +336,18 @@ mod tests {
         for _ in 0..100 {
             let pause = varied(Duration::from_secs(4));
             assert!((3.0..=5.0).contains(&pause.as_secs_f64()), "{pause:?}");
+        }
+    }
+
+    #[test]
+    fn only_an_address_stands_in_links() {
+        for address in ["https://relay.host:7400/nozzle/", "http://[::1]:7400/nozzle-2/"] {
+            assert!(is_address(address), "{address}");
+        }
+        for text in
+            ["", "https:///", "https://relay/run", "ftp://relay/", "https://relay/?token=x/"]
+        {
+            assert!(!is_address(text), "{text}");
         }
     }
 

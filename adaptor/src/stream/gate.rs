@@ -15,10 +15,10 @@ use axum::{
 };
 
 use super::{
+    Shared,
     connection::{Connection, Way},
     credentials::{Access, Credentials, Holder, Shown, parameter},
-    relay::messages::ACCESS,
-    routes::Shared,
+    relay_messages::ACCESS,
 };
 use crate::lock::lock;
 use tombolo_pipelines::language::{JournalNote, RefusedRequest};
@@ -92,11 +92,7 @@ pub(super) fn add_headers(response: &mut Response) {
 
 impl Gate {
     /// Takes note of who asks, or has the answer for who goes no further.
-    pub(super) fn admit(
-        &self,
-        connection: &Connection,
-        request: &mut Request,
-    ) -> Option<Response> {
+    pub(super) fn admit(&self, connection: &Connection, request: &mut Request) -> Option<Response> {
         if let Some(answer) = self.foreign(connection, request) {
             return Some(answer);
         }

@@ -12,7 +12,7 @@ use std::{
 use super::{
     connect::Connect,
     credentials::{Access, Credentials},
-    relay::messages::Attached,
+    relay_messages::Attached,
     socket::Place,
     tls::machine,
 };
@@ -142,10 +142,7 @@ impl Links {
         let path = std::path::absolute(&path).unwrap_or(path);
         let path = path.display();
         let certificate = self.fingerprint.as_ref().map_or_else(String::new, |fingerprint| {
-            format!(
-                "\nits certificate has the SHA-256 fingerprint {}",
-                with_colons(fingerprint)
-            )
+            format!("\nits certificate has the SHA-256 fingerprint {}", with_colons(fingerprint))
         });
         let invitation = match self.browser_link().filter(|_| terminal) {
             Some(link) => format!(

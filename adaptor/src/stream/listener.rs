@@ -12,7 +12,7 @@ use super::{
     pool::Pool,
     socket::{Accepted, Listening},
 };
-use crate::client::Stream;
+use crate::dial::Stream;
 
 /// Connections that are ready and that the server has not taken yet.
 const READY: usize = 16;

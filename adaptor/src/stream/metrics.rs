@@ -10,7 +10,7 @@ use axum::{
 };
 use serde_json::Value;
 
-use super::{credentials::Holder, hub::Hub, routes::Shared};
+use super::{Shared, credentials::Holder, hub::Hub};
 use crate::lock::lock;
 
 const TEXT: [(HeaderName, &str); 1] =

@@ -37,6 +37,7 @@ mod pace;
 mod playback;
 mod pool;
 pub mod relay;
+mod relay_messages;
 mod routes;
 mod seats;
 mod secret;
@@ -61,7 +62,7 @@ use std::{
 
 use serde::Serialize;
 use tokio::sync::oneshot;
-use tombolo_pipelines::language::{JournalNote, Listen, Message, StreamServer};
+use tombolo_pipelines::language::{JournalNote, Listen, Message, StreamLimits, StreamServer};
 
 use crate::lock::lock;
 
@@ -76,7 +77,6 @@ use credentials::{Access, Credentials};
 use gate::{Gate, Refusals};
 use links::Links;
 use listener::Listener;
-use routes::Shared;
 use socket::{Listening, Place, Socket};
 use tls::Identity;
 use tokio_rustls::TlsAcceptor;
@@ -177,6 +177,18 @@ pub(crate) struct Server {
     hub: Arc<Hub>,
     stop: Option<oneshot::Sender<()>>,
     threads: Vec<JoinHandle<()>>,
+}
+
+/// The state that every request is answered from.
+#[derive(Clone)]
+struct Shared {
+    gate: Arc<Gate>,
+    hub: Arc<Hub>,
+    commands: Arc<dyn CommandSink>,
+    files: ViewerFiles,
+    limits: StreamLimits,
+    /// The recording that is served in place of a run.
+    playback: Option<Arc<playback::Shown>>,
 }
 
 /// The ways by which connections come to a server.
@@ -363,7 +375,7 @@ async fn serve(
     let router = routes::router(shared).into_make_service_with_connect_info::<Connection>();
     let connecting = async {
         match &ways.relay {
-            Some(relay) => relay.keep(&entrance, &ways.links).await,
+            Some(relay) => relay.keep(&entrance, || ways.links.renew()).await,
             None => std::future::pending().await,
         }
     };

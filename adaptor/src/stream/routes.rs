@@ -15,35 +15,22 @@ use axum::{
 };
 use serde::Deserialize;
 use tombolo_pipelines::{
-    language::{StreamLimits, order_schema, pipeline_schema},
+    language::{order_schema, pipeline_schema},
     limits::DOCUMENT,
 };
 
 use super::{
-    CommandSink,
+    Shared,
     connection::Connection,
     credentials::{Access, Holder, parameter},
-    gate::{self, Gate},
-    hub::{Arrival, Hub},
-    metrics, playback, session,
-    viewer_files::ViewerFiles,
+    gate,
+    hub::Arrival,
+    metrics, session,
 };
 
 /// The largest message that is read at all, in bytes: so much more than a document may have that
 /// one too long is answered with an error.
 const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
-
-/// The state that every request is answered from.
-#[derive(Clone)]
-pub(super) struct Shared {
-    pub(super) gate: Arc<Gate>,
-    pub(super) hub: Arc<Hub>,
-    pub(super) commands: Arc<dyn CommandSink>,
-    pub(super) files: ViewerFiles,
-    pub(super) limits: StreamLimits,
-    /// The recording that is served in place of a run.
-    pub(super) playback: Option<Arc<playback::Shown>>,
-}
 
 /// All routes, behind the gate.
 pub(super) fn router(shared: Shared) -> Router {

@@ -16,12 +16,11 @@ use tombolo_pipelines::language::{
 };
 
 use super::{
-    CommandSink, PING_PERIOD,
+    CommandSink, PING_PERIOD, Shared,
     allowance::RATE,
     credentials::{Access, Holder},
     hub::Hub,
     outbox::{Client, Message},
-    routes::Shared,
     text::Text,
 };
 use crate::lock::lock;

@@ -9,7 +9,7 @@ use std::{
 use tokio::net::TcpStream;
 use tombolo_pipelines::language::Listen;
 
-use crate::client::Stream;
+use crate::dial::Stream;
 
 /// Where a server listens, once it does.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -60,9 +60,8 @@ impl Identity {
     /// The certificate that is kept in a directory, which is made for these names where it is missing.
     pub(super) fn kept(directory: &Path, names: Vec<String>) -> Result<Self, StreamError> {
         let [certificate, key] = ["certificate.der", "key.der"].map(|file| directory.join(file));
-        let wrong = |path: &Path, reason: &str| {
-            StreamError::Tls(format!("{}: {reason}", path.display()))
-        };
+        let wrong =
+            |path: &Path, reason: &str| StreamError::Tls(format!("{}: {reason}", path.display()));
         if !key.exists() {
             let made = rcgen::generate_simple_self_signed(names)
                 .map_err(|error| StreamError::Tls(error.to_string()))?;
@@ -78,8 +77,8 @@ impl Identity {
             write(&certificate, made.cert.der())?;
             write(&key, &made.signing_key.serialize_der())?;
         }
-        let chain = std::fs::read(&certificate)
-            .map_err(|error| wrong(&certificate, &error.to_string()))?;
+        let chain =
+            std::fs::read(&certificate).map_err(|error| wrong(&certificate, &error.to_string()))?;
         let mut bytes = Vec::new();
         let mut file = open_private(&key).map_err(StreamError::Tls)?;
         file.read_to_end(&mut bytes).map_err(|error| wrong(&key, &error.to_string()))?;

@@ -65,7 +65,7 @@ impl Config {
 }
 
 /// The server that viewers connect to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StreamServer {
     /// The address and port to listen on, where port 0 takes any free one, or `unix:/PATH` for a
@@ -105,21 +105,6 @@ pub struct StreamServer {
     pub secrets: Option<String>,
     /// How many may connect, and how long a driver may be silent.
     pub limits: StreamLimits,
-}
-
-impl Default for StreamServer {
-    fn default() -> Self {
-        Self {
-            listen: None,
-            connect: None,
-            name: None,
-            tls: None,
-            insecure: false,
-            token: None,
-            secrets: None,
-            limits: StreamLimits::default(),
-        }
-    }
 }
 
 impl StreamServer {

@@ -23,6 +23,9 @@ pub struct Order {
     pub deform: Option<Deformation>,
     /// The guard that the mesh must keep to; `None` is the configuration's.
     pub guard: Option<Guard>,
+    /// The id of an order that has not begun to move the mesh, whose place this one takes: that one is
+    /// rejected at the same safe point. Where it has begun, this one is rejected.
+    pub replaces: Option<String>,
 }
 
 /// A change of the stack of edits.
@@ -65,7 +68,7 @@ impl Order {
 impl From<Change> for Order {
     /// The change with the configuration's settings.
     fn from(change: Change) -> Self {
-        Self { change, schedule: None, deform: None, guard: None }
+        Self { change, schedule: None, deform: None, guard: None, replaces: None }
     }
 }
 
@@ -92,6 +95,10 @@ struct OrderFields {
     /// The guard that the mesh must keep to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     guard: Option<Guard>,
+    /// The id of an order that has not begun to move the mesh, whose place this one takes: that one is
+    /// rejected at the same safe point. Where it has begun, this one is rejected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    replaces: Option<String>,
 }
 
 impl TryFrom<OrderFields> for Order {
@@ -114,14 +121,15 @@ impl TryFrom<OrderFields> for Order {
                 );
             }
         };
-        Ok(Self { change, schedule: fields.schedule, deform: fields.deform, guard: fields.guard })
+        let OrderFields { schedule, deform, guard, replaces, .. } = fields;
+        Ok(Self { change, schedule, deform, guard, replaces })
     }
 }
 
 impl From<Order> for OrderFields {
     fn from(order: Order) -> Self {
-        let Order { change, schedule, deform, guard } = order;
-        let fields = Self { schedule, deform, guard, ..Self::default() };
+        let Order { change, schedule, deform, guard, replaces } = order;
+        let fields = Self { schedule, deform, guard, replaces, ..Self::default() };
         match change {
             Change::Edits(edits) => Self { edits: Some(edits), ..fields },
             Change::Stack(stack) => Self { stack: Some(stack), ..fields },

@@ -19,6 +19,7 @@ const LENGTH: usize = 400;
 /// let relay: RelayAddress = "relay.example.org:7400".parse()?;
 /// assert!(relay.is_encrypted() && relay.sha256().is_none());
 /// assert_eq!(relay.authority(), "relay.example.org:7400");
+/// assert_eq!(relay.host(), ("relay.example.org", 7400));
 /// let error = "http://relay.example.org:7400".parse::<RelayAddress>().unwrap_err();
 /// assert!(error.contains("a relay on another machine is reached over https"));
 /// # Ok::<(), String>(())
@@ -35,6 +36,14 @@ impl RelayAddress {
     #[must_use]
     pub fn authority(&self) -> &str {
         &self.authority
+    }
+
+    /// The host as the system resolves it, without brackets, and the port.
+    #[must_use]
+    pub fn host(&self) -> (&str, u16) {
+        let (host, port) = self.authority.rsplit_once(':').unwrap_or((&self.authority, ""));
+        let host = host.strip_prefix('[').and_then(|host| host.strip_suffix(']')).unwrap_or(host);
+        (host, port.parse().unwrap_or_default())
     }
 
     /// Whether connections to it are encrypted.
@@ -75,8 +84,7 @@ impl FromStr for RelayAddress {
             Some(_) => return Err(wrong("it begins with neither https:// nor http://")),
         };
         let authority = authority.strip_suffix('/').unwrap_or(authority);
-        let (host, port) =
-            authority.rsplit_once(':').ok_or_else(|| wrong("it names no port"))?;
+        let (host, port) = authority.rsplit_once(':').ok_or_else(|| wrong("it names no port"))?;
         if !port.parse::<u16>().is_ok_and(|port| port > 0) {
             return Err(wrong("its port is not a number from 1 to 65535"));
         }
@@ -98,7 +106,9 @@ impl FromStr for RelayAddress {
             {
                 Some(digits.to_ascii_lowercase())
             }
-            Some(_) => return Err(wrong("its fingerprint is not sha256= and 64 hexadecimal digits")),
+            Some(_) => {
+                return Err(wrong("its fingerprint is not sha256= and 64 hexadecimal digits"));
+            }
         };
         if sha256.is_some() && !is_encrypted {
             return Err(wrong("without encryption there is no certificate"));
@@ -143,8 +153,7 @@ impl RunName {
     #[must_use]
     pub fn numbered(&self, number: usize) -> Self {
         let ending = format!("-{number}");
-        let kept: String =
-            self.0.chars().take(Self::LENGTH.saturating_sub(ending.len())).collect();
+        let kept: String = self.0.chars().take(Self::LENGTH.saturating_sub(ending.len())).collect();
         Self(kept + &ending)
     }
 }
@@ -214,7 +223,10 @@ mod tests {
         let digits = "0a".repeat(32);
         for (text, written) in [
             ("relay.host:7400".to_owned(), "https://relay.host:7400".to_owned()),
-            (format!("[::1]:1#sha256={}", "0A".repeat(32)), format!("https://[::1]:1#sha256={digits}")),
+            (
+                format!("[::1]:1#sha256={}", "0A".repeat(32)),
+                format!("https://[::1]:1#sha256={digits}"),
+            ),
             ("http://127.0.0.1:7400/".into(), "http://127.0.0.1:7400".into()),
         ] {
             let address: RelayAddress = text.parse().expect("an address");

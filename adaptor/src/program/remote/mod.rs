@@ -2,6 +2,7 @@
 
 mod doctor;
 mod order;
+mod queue;
 mod status;
 mod steer;
 mod watch;
@@ -17,9 +18,9 @@ use crate::program::{Failure, say};
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
 
 /// The names of these tasks, which have exit codes of their own.
-const NAMES: [&str; 11] = [
-    "status", "watch", "order", "forecast", "undo", "pause", "resume", "stop", "set", "cancel",
-    "doctor",
+const NAMES: [&str; 13] = [
+    "status", "watch", "order", "forecast", "undo", "queue", "replace", "pause", "resume", "stop",
+    "set", "cancel", "doctor",
 ];
 
 /// How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
@@ -55,6 +56,12 @@ pub(crate) enum Task {
     /// Take the last orders back
     #[command(after_help = EXIT_CODES)]
     Undo(order::UndoOptions),
+    /// List the orders that wait: why, and since when
+    #[command(after_help = EXIT_CODES)]
+    Queue(Target),
+    /// Put another order in the place of one that has not begun to move the mesh
+    #[command(after_help = EXIT_CODES)]
+    Replace(order::ReplaceOptions),
     /// Hold the solver at its next safe point
     #[command(after_help = EXIT_CODES)]
     Pause(Target),
@@ -87,6 +94,8 @@ pub(crate) fn run(task: &Task) -> Result<(), Failure> {
         Task::Order(options) => (order::order(options), options.target.json),
         Task::Forecast(options) => (order::forecast(options), options.target.json),
         Task::Undo(options) => (order::undo(options), options.target.json),
+        Task::Queue(target) => (queue::queue(target), target.json),
+        Task::Replace(options) => (order::replace(options), options.target.json),
         Task::Pause(target) => (steer::pause(target), target.json),
         Task::Resume(target) => (steer::resume(target), target.json),
         Task::Stop(target) => (steer::stop(target), target.json),

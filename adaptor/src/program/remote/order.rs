@@ -59,10 +59,33 @@ pub(crate) struct UndoOptions {
     wait: bool,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct ReplaceOptions {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// The id of the order that waits, as `tombolo queue` tells it
+    order: String,
+    /// The order that takes its place, or a list of edits, as JSON; `-` reads it from the input
+    file: PathBuf,
+    /// Wait until the solver has been given the last shape
+    #[arg(long)]
+    wait: bool,
+}
+
 pub(crate) fn order(options: &Options) -> Result<(), Failure> {
     let order = read_order(&options.file)?;
     let client = steer(&options.target)?;
     let order = with_displacements(order, &client)?;
+    give(&client, &order, options.wait, options.target.json)
+}
+
+/// Gives an order in the place of another. Without waiting for its shapes it ends once the run has put
+/// it there.
+pub(crate) fn replace(options: &ReplaceOptions) -> Result<(), Failure> {
+    let order = read_order(&options.file)?;
+    let client = steer(&options.target)?;
+    let mut order = with_displacements(order, &client)?;
+    order.replaces = Some(options.order.clone());
     give(&client, &order, options.wait, options.target.json)
 }
 

@@ -302,40 +302,52 @@ impl Steerer {
         self.quality.map(|(min, mean)| (min, mean, 0)).or(reference)
     }
 
-    /// Puts an order at the end of the queue, with the room that it takes there.
+    /// Puts an order into the queue, with the room that it takes there: at the end, or where a
+    /// withdrawn one was.
     pub(crate) fn take(
         &mut self,
         id: String,
         order: Order,
         background: bool,
         reservation: Option<Reservation>,
+        index: Option<usize>,
     ) {
         let background = background && self.worker.is_some();
-        let before = self.waiting.back().map(|task| &task.id);
-        let before = before.or(self.computing.as_ref().map(|computing| &computing.id));
-        if let Some(before) = before {
-            let reason = format!("order {before}, which came before it");
-            self.log.update(&id, |order| order.waits_for = Some(reason));
-        }
-        self.waiting.push_back(Task { id, order, background, reservation });
+        let index = index.unwrap_or(self.waiting.len()).min(self.waiting.len());
+        self.waiting.insert(index, Task { id, order, background, reservation });
+        self.say_why(index);
+        self.say_why(index + 1);
     }
 
-    /// Takes an order back that waits or whose plan is being made; the error says that it moves the
-    /// mesh already. `None` where it is neither.
-    pub(crate) fn cancel(&mut self, id: &str) -> Option<Result<(), String>> {
+    /// Says what an order of the queue waits for, where it is another order.
+    fn say_why(&self, index: usize) {
+        let Some(task) = self.waiting.get(index) else { return };
+        let before = match index.checked_sub(1).and_then(|index| self.waiting.get(index)) {
+            Some(before) => Some(&before.id),
+            None => self.computing.as_ref().map(|computing| &computing.id),
+        };
+        if let Some(before) = before {
+            let reason = format!("order {before}, which came before it");
+            self.log.update(&task.id, |order| order.waits_for = Some(reason));
+        }
+    }
+
+    /// Takes an order out of the queue, or one whose plan is being made, and returns its place in the
+    /// queue; the error says that it moves the mesh already. `None` where it is neither.
+    pub(crate) fn withdraw(&mut self, id: &str) -> Option<Result<usize, String>> {
         if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
             self.waiting.remove(index);
-            return Some(Ok(()));
+            return Some(Ok(index));
         }
         if let Some(computing) = self.computing.take_if(|computing| computing.id == id) {
             if let Some(worker) = &self.worker {
                 worker.cancel(computing.number);
             }
-            return Some(Ok(()));
+            return Some(Ok(0));
         }
         let motion = self.motion.as_ref().filter(|motion| motion.id == id)?;
         Some(Err(format!(
-            "order '{id}' moves the mesh already (shape {} of {}), so that it cannot be cancelled; an order {{\"undo\": 1}} goes back",
+            "order '{id}' moves the mesh already (shape {} of {}), so that it cannot be taken back; an order {{\"undo\": 1}} goes back",
             motion.taken,
             motion.plan.shapes()
         )))

@@ -14,15 +14,12 @@ use axum::{
 };
 use tokio::time::timeout;
 
-use super::{
-    RelayState,
-    messages::{Attach, Attached, MESSAGE, PROTOCOL, VERSION},
-    runs::RUNS,
-};
+use super::{RelayState, runs::RUNS};
 use crate::stream::{
     PING_PERIOD,
     connection::Connection,
     credentials::{Access, Holder},
+    relay_messages::{Attach, Attached, MESSAGE, PROTOCOL, VERSION},
     secret::Secret,
 };
 

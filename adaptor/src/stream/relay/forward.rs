@@ -9,7 +9,10 @@ use std::{sync::Arc, time::Duration};
 use axum::{
     body::Body,
     extract::{ConnectInfo, Request, State},
-    http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, Version, header, uri::PathAndQuery},
+    http::{
+        HeaderMap, HeaderName, HeaderValue, Method, StatusCode, Uri, Version, header,
+        uri::PathAndQuery,
+    },
     response::{IntoResponse, Response},
 };
 use hyper::{
@@ -21,10 +24,9 @@ use tokio::time::timeout;
 
 use super::{
     RelayState,
-    messages::ACCESS,
     runs::{Room, Unreached},
 };
-use crate::stream::{connection::Connection, credentials::Access};
+use crate::stream::{connection::Connection, credentials::Access, relay_messages::ACCESS};
 
 /// How long a run may take to answer. The first request for a surface has it encoded.
 const ANSWER: Duration = Duration::from_secs(120);
@@ -66,7 +68,10 @@ pub(super) async fn forward(
     let (stream, room) = match relay.runs.dial(&run, connection.address()).await {
         Ok(connected) => connected,
         Err(Unreached::TooMany) => {
-            return said(StatusCode::SERVICE_UNAVAILABLE, "too many connections are open already\n");
+            return said(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "too many connections are open already\n",
+            );
         }
         Err(Unreached::NoAnswer) => {
             return said(StatusCode::BAD_GATEWAY, "the run does not answer the relay\n");

@@ -12,7 +12,6 @@
 
 mod attach;
 mod forward;
-pub(super) mod messages;
 mod page;
 mod runs;
 
@@ -42,6 +41,7 @@ use super::{
     gate::{self, Gate},
     links::{LinkFile, authority, fragment, with_colons},
     listener::Listener,
+    relay_messages::{ATTACH, CARRY},
     socket::Socket,
     tls::{Identity, names_of},
 };
@@ -297,8 +297,8 @@ fn router(state: Arc<RelayState>) -> Router {
     Router::new()
         .route("/", get(page::page))
         .route("/-/runs", get(page::list))
-        .route(messages::ATTACH, get(attach::attach))
-        .route(&format!("{}{{ticket}}", messages::CARRY), get(attach::carry))
+        .route(ATTACH, get(attach::attach))
+        .route(&format!("{}{{ticket}}", CARRY), get(attach::carry))
         .route_layer(middleware::from_fn(gate::holders_only))
         .fallback(forward::forward)
         .layer(middleware::from_fn_with_state(Arc::clone(&state), guard))

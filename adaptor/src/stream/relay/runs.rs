@@ -14,8 +14,10 @@ use tokio::{
 };
 use tombolo_pipelines::language::RunName;
 
-use super::messages::Open;
-use crate::{lock::lock, stream::secret::Secret};
+use crate::{
+    lock::lock,
+    stream::{relay_messages::Open, secret::Secret},
+};
 
 /// Runs at once.
 pub(super) const RUNS: usize = 64;
@@ -95,8 +97,7 @@ impl Runs {
         };
         let (asks, asked) = mpsc::channel(ASKED);
         let room = Arc::new(Semaphore::new(self.viewers.div_ceil(SHARE)));
-        let run =
-            Arc::new(Run { name, since: SystemTime::now(), address, instance, asks, room });
+        let run = Arc::new(Run { name, since: SystemTime::now(), address, instance, asks, room });
         state.runs.insert(run.name.clone(), Arc::clone(&run));
         Some((run, asked))
     }
@@ -187,7 +188,9 @@ mod tests {
         assert_eq!(back.name.as_str(), "nozzle");
         runs.leave(&first);
         drop(first);
-        assert!(asked.try_recv().is_err_and(|error| error == mpsc::error::TryRecvError::Disconnected));
+        assert!(
+            asked.try_recv().is_err_and(|error| error == mpsc::error::TryRecvError::Disconnected)
+        );
         assert_eq!(runs.list().len(), 2);
         runs.leave(&back);
         assert!(runs.find("nozzle").is_none() && runs.find("nozzle-2").is_some());

@@ -56,7 +56,7 @@ impl Prepared {
     pub(super) fn order(&self, stage: &OrderStage, progress: &mut Progress) {
         let edits = std::mem::take(&mut progress.edits);
         let OrderStage { schedule, deform, guard } = stage.clone();
-        let order = Order { change: Change::Edits(edits), schedule, deform, guard };
+        let order = Order { change: Change::Edits(edits), schedule, deform, guard, replaces: None };
         self.command(Command::Order(order), progress);
     }
 
