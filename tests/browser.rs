@@ -1,5 +1,6 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
-//! shaping by hand, a first day, a shape changed by two people, and the end of a run.
+//! shaping by hand, a first day, a shape changed by two people, several people together, and the end of
+//! a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -66,6 +67,14 @@ fn seeing_in_a_browser() {
     let _alone = alone();
     let mut run = nozzle();
     drive("seeing.mjs", &mut run);
+    assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
+#[test]
+fn several_people_in_a_browser() {
+    let _alone = alone();
+    let mut run = nozzle();
+    drive("together.mjs", &mut run);
     assert!(run.is_running(), "the run ended:\n{}", run.text());
 }
 

@@ -151,6 +151,7 @@ impl Default for Settings {
             record_megabytes: language::record_megabytes(),
             steering: Default::default(),
             watch: false,
+            units: BTreeMap::new(),
             pipelines: Vec::new(),
         };
         Self {

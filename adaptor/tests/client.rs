@@ -331,6 +331,9 @@ fn the_program_reaches_a_run() {
     for (arguments, code, expected) in [
         (&["status", "link.txt"][..], 0, "running: cycle"),
         (&["doctor", "link.txt"], 0, "token: ok"),
+        (&["link", "link.txt"], 0, "/?key="),
+        (&["link", "link.txt", "--for", "drive", "--json"], 0, "{\"link\":{\"address\":\"http://"),
+        (&["link", "link.txt", "--for", "look"], 2, "watch"),
         (&["forecast", "link.txt", "squeeze.json"], 0, "would be applied"),
         (&["forecast", "link.txt", "too-far.json"], 1, "would be rejected"),
         (&["order", "link.txt", "squeeze.json", "--wait"], 0, "applied"),

@@ -162,8 +162,14 @@ fn viewers_know_what_the_features_are_to_the_flow_and_what_can_be_taken_back() {
 #[test]
 fn a_viewer_sees_the_run_and_changes_its_shape() {
     let parameter = Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
+    let with_unit = |unit: &str| {
+        let units = format!(r#"{{"version": 1, "units": {{"speed": "{unit}"}},"#);
+        LINK_TO_ALL.replacen(r#"{"version": 1,"#, &units, 1)
+    };
+    let wrong = tombolo::pipelines::language::parse(&with_unit(" "), "run.json");
+    assert!(wrong.is_err_and(|error| error.to_string().contains("units.speed: expected a unit")));
     let mut solver = Solver::new(Settings {
-        config: config(LINK_TO_ALL),
+        config: config(&with_unit("m/s")),
         parameters: vec![parameter],
         ..Settings::default()
     });
@@ -174,7 +180,7 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     assert_eq!(hello["views"], json!([{"name": "boundary", "kind": "surface"}]));
     assert_eq!(
         hello["fields"],
-        json!([{"name": "speed", "association": "vertex", "components": 1}])
+        json!([{"name": "speed", "association": "vertex", "components": 1, "unit": "m/s"}])
     );
     assert_eq!(hello["features"][5]["name"], "z-max");
     assert_eq!(hello["features"][5]["faces"], 32);

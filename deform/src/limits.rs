@@ -100,6 +100,12 @@ pub const PENDING: Limit =
 /// Bytes of the commands of viewers that wait.
 pub const PENDING_BYTES: Limit =
     limit("bytes that wait", 64 << 20, "the commands of viewers whose turn has not come");
+/// Notes that are pinned in a run.
+pub const NOTES: Limit = limit("notes", 200, "a run: those that are pinned in its picture");
+/// Characters of a note.
+pub const NOTE: Limit = limit("characters", 500, "a note");
+/// Characters of the name of a viewer.
+pub const VIEWER_NAME: Limit = limit("characters", 40, "the name that a viewer gives itself");
 
 /// Surfaces that cut a mesh at once.
 pub const CUTS: Limit = limit("surfaces", 256, "the planes of a slice, or the values of a contour");
@@ -138,7 +144,7 @@ pub const ERRORS: Limit =
     limit("errors", 100, "what is told of one text; of more errors only their number");
 
 /// All of them.
-pub const ALL: [Limit; 31] = [
+pub const ALL: [Limit; 34] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -158,6 +164,9 @@ pub const ALL: [Limit; 31] = [
     WAITING_BYTES,
     PENDING,
     PENDING_BYTES,
+    NOTES,
+    NOTE,
+    VIEWER_NAME,
     CUTS,
     PROBES,
     BINS,

@@ -127,6 +127,19 @@ const steps = [
     check(/^tombolo-\d+\.(webm|mp4)$/.test(film.suggestedFilename()), `the film is called ${film.suggestedFilename()}`);
     const { size } = statSync(await film.path());
     check(size > 5000, `the film has ${size} bytes`);
+    // The scalar bar is in it: from top to bottom it has the colours of both ends.
+    const other = await browser.newPage();
+    const ends = await other.evaluate(async ([bytes, type]) => {
+      const video = Object.assign(document.createElement("video"), { muted: true, src: `data:${type};base64,${bytes}` });
+      await new Promise((resolve, reject) => Object.assign(video, { onloadeddata: resolve, onerror: () => reject(new Error("the film cannot be played")) }));
+      const canvas = Object.assign(document.createElement("canvas"), { width: video.videoWidth, height: video.videoHeight });
+      const context = canvas.getContext("2d");
+      context.drawImage(video, 0, 0);
+      const unit = Math.max(1, canvas.height / 800);
+      return [225, 45].map((up) => [...context.getImageData(canvas.width - 103 * unit, canvas.height - up * unit, 1, 1).data]);
+    }, [readFileSync(await film.path()).toString("base64"), film.suggestedFilename().endsWith("mp4") ? "video/mp4" : "video/webm"]);
+    await other.close();
+    check(Math.max(...[0, 1, 2].map((k) => Math.abs(ends[0][k] - ends[1][k]))) > 60, `where the scalar bar is the film has the colours ${JSON.stringify(ends)}`);
     console.log(`    ${film.suggestedFilename()}, ${size} bytes`);
   }],
   ["edits go into a file and come back; the surface and the view go into files", async () => {

@@ -3,7 +3,8 @@
  * a copy; the numbers of `views` and `featureBounds` are those of the newest frame.
  */
 import type { ConnectionState } from "./connection/connection";
-import type { QualitySummary, Role, RunEnd, Status, Vector } from "./connection/protocol";
+import type { Person, PinnedNote, QualitySummary, Role, RunEnd, Status, Vector } from "./connection/protocol";
+import type { Stand } from "./picture/camera";
 import type { Picture } from "./picture/scene";
 import type { OrderRecord, PreviewState } from "./store/state";
 
@@ -34,6 +35,13 @@ export interface Inspection {
   readonly status: Status | null;
   readonly quality: QualitySummary | null;
   readonly stack: readonly unknown[];
+  /** Who is connected. */
+  readonly people: readonly Person[];
+  /** The notes that are pinned. */
+  readonly notes: readonly PinnedNote[];
+  /** Whether the camera of the one who steers is followed, and where the camera is. */
+  readonly following: boolean;
+  readonly camera: Stand;
   /** The last word of a run that has ended. */
   readonly end: RunEnd | null;
   /** Handle and fixed features, by name. */

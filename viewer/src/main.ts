@@ -23,6 +23,8 @@ import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
 import { FilesPanel } from "./panels/files";
+import { NotesPanel } from "./panels/notes";
+import { PeoplePanel } from "./panels/people";
 import { MonitorPanel } from "./panels/monitors";
 import { ParameterPanel } from "./panels/parameters";
 import { RecordingPanel } from "./panels/recording";
@@ -35,19 +37,20 @@ import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
-import { ScalarBars, fieldText } from "./picture/bars";
+import { ScalarBars, fieldText, withUnit } from "./picture/bars";
 import { Triad, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
 import { Pins } from "./picture/pins";
 import { watchPointer } from "./picture/pointer";
 import { readingText } from "./picture/probe";
 import { Compare } from "./picture/compare";
+import { Following } from "./picture/following";
 import { Earlier } from "./picture/earlier";
 import type { Content } from "./picture/earlier";
 import { Movie } from "./picture/movie";
 import { SliceHandle } from "./picture/slice-handle";
 import { Ruler } from "./picture/ruler";
-import { save, withBars } from "./picture/screenshot";
+import { paint, save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
 import type { Bar } from "./picture/scene";
 import { Forecasts } from "./preview/forecasts";
@@ -108,8 +111,12 @@ const triad = new Triad();
 /** A field and its component in words. */
 const fieldTitle = (field: string | null, component: number): string =>
   fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, FIELD_TITLES[field ?? ""]);
+/** The unit of a field; null where none is given. */
+const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
+/** A field and its component in words, with its unit. */
+const titleWithUnit = (field: string | null, component: number): string => withUnit(fieldTitle(field, component), unitOf(field));
 let shownBars: Bar[] = [];
-const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: null }), (names, [low, high]) => {
+const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
     const look = store.state.looks[view];
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
@@ -125,6 +132,8 @@ const scene = new Scene(part("scene"), selection, {
   drawn: (axes) => {
     triad.turn(axes);
     marks.draw();
+    movie.drawn();
+    following.drawn();
     if (pins.update()) history.update();
     worst.update();
     slice.drawn();
@@ -156,14 +165,20 @@ function measureWith(one: Ruler): void {
 }
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
 const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
-const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active || line.active);
+const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active || line.active || notes.choosing);
 watchPointer(part("scene"), scene, selection, {
   reading: (x, y) => {
     const probe = scene.probe(x, y);
     const reading = probe && scene.read(probe);
-    return reading ? readingText(reading, fieldTitle(reading.field, reading.component)) : "";
+    return reading ? readingText(reading, fieldTitle(reading.field, reading.component), unitOf(reading.field)) : "";
   },
   clicked: (x, y) => {
+    if (notes.choosing) {
+      const probe = scene.probe(x, y);
+      const reading = probe && scene.read(probe);
+      if (reading) notes.take(reading.point);
+      return true;
+    }
     const measuring = [ruler, line].find(({ active }) => active);
     if (!measuring) return false;
     const probe = scene.probe(x, y);
@@ -193,6 +208,9 @@ const compare = new Compare(part("before"), part("compare"), scene, earlier, {
   views: () => store.state.hello?.views ?? [], looks: () => store.state.looks, features: () => store.state.hello?.features ?? [], selection, trouble: report,
 });
 part("compare").addEventListener("click", () => { part("now").hidden = part("before").hidden; });
+const following = new Following(store, commands, scene.camera, ({ parallel }) => {
+  document.querySelector('[data-camera="parallel"]')?.setAttribute("aria-pressed", String(parallel));
+});
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 new CameraTools(part("tools"), scene);
 const reveal = watchDrawers();
@@ -200,6 +218,14 @@ new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
   scene.setTheme(theme);
   compare.setTheme(theme);
 });
+const notes: NotesPanel = new NotesPanel(store, commands, marks, {
+  flyTo: (place) => scene.camera.flyTo(place),
+  middle: () => {
+    const { left, top, width, height } = part("scene").getBoundingClientRect();
+    const probe = scene.probe(left + width / 2, top + height / 2);
+    return (probe && scene.read(probe))?.point ?? scene.camera.stand.focalPoint;
+  },
+}, reveal);
 /** What a view holds now. */
 function contentOf(view: string): Content | null {
   const layer = scene.layers.get(view);
@@ -209,19 +235,27 @@ const monitored = new History();
 const history = new HistoryPlot(monitored, kept.dock.chosen, (chosen) => { kept.dock = { ...kept.dock, chosen }; });
 const lookOf = (view: string | null): Look | null => (view === null ? null : store.state.looks[view] ?? null);
 const linePlot = new LinePlot(store, pipelines, {
-  frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => fieldTitle(field, component),
+  frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier, () => dock.update());
 const histogramPlot = new HistogramPlot(store, {
-  content: contentOf, title: ({ field, component }) => fieldTitle(field, component),
+  content: contentOf, title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier);
 const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; });
 for (const tab of [history, linePlot, histogramPlot]) dock.add(tab);
 store.watch((state) => state.frames.count > 0, () => dock.update());
-const movie = new Movie(() => scene.element, () => `tombolo-${store.state.frames.cycle ?? 0}`, (isRunning) => {
-  part("movie").setAttribute("aria-pressed", String(isRunning));
-  write(part("movie"), isRunning ? "End film" : "Film");
-}, report);
-const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => fieldTitle(field, component), (key) => {
+const barTitle = ({ look: { field, component } }: Bar): string => titleWithUnit(field, component);
+const ink = (): string => getComputedStyle(document.body).color;
+const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink()), {
+  name: () => `tombolo-${store.state.frames.cycle ?? 0}`,
+  told: (isRunning) => {
+    part("movie").setAttribute("aria-pressed", String(isRunning));
+    write(part("movie"), isRunning ? "End film" : "Film");
+    // So that it begins with what is seen, also where nothing changes.
+    if (isRunning) scene.redraw();
+  },
+  trouble: report,
+});
+const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
   history.choose(key);
   dock.choose(history);
 });
@@ -233,14 +267,15 @@ watchPictureTools(part("scene"), part("stage"), {
   unpin: () => pins.clear(),
   ruler: () => measureWith(ruler),
   line: () => measureWith(line),
+  note: () => notes.toggle(),
   movie: () => movie.toggle(),
-  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, ({ look: { field, component } }) => fieldTitle(field, component),
-    getComputedStyle(document.body).color), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
+  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
 const bar = new StatusBar(store, commands);
 new WheelPanel(store, commands);
+const people = new PeoplePanel(store, commands, kept, () => window.location.href);
 new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
 const form = new EditForm(part("fields"), store);
@@ -281,6 +316,12 @@ function takeMessage(message: ServerMessage): void {
     case "done": return;
     case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
+    case "link": return void people.take(message.body);
+    case "people": return store.dispatch({ type: "people", viewers: message.body.viewers });
+    case "followed": return following.followed(message.body.by);
+    case "camera": return following.take(message.body);
+    case "note": return store.dispatch({ type: "note pinned", note: message.body });
+    case "note_removed": return store.dispatch({ type: "note removed", number: message.body.number });
     case "end":
       // There is nothing to come back to.
       connection.stop();
@@ -288,7 +329,7 @@ function takeMessage(message: ServerMessage): void {
     case "error": {
       const { id, message: text } = message.body;
       if (pipelines.answered(id)) void pipelines.told(-2);
-      if (id && (forecasts.refused(id, text) || parameters.refused(id, text))) return;
+      if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
     }
   }
@@ -412,6 +453,10 @@ publish({
       inverted: answer?.quality?.inverted ?? null, fraction: answer?.fraction ?? null,
     };
   },
+  get people() { return structuredClone(store.state.people); },
+  get notes() { return structuredClone(store.state.notes); },
+  get following() { return store.state.following; },
+  get camera() { return scene.camera.stand; },
   get end() { return structuredClone(store.state.end); },
   get errors() { return [...store.state.errors]; },
   get skeleton() {

@@ -402,7 +402,7 @@ impl CommandSink for Intake {
             }
             Message::Command(command) => command,
             // The session has answered it.
-            Message::Wheel(_) => return Ok(()),
+            Message::Wheel(_) | Message::Together(_) => return Ok(()),
         };
         check_files(&command)?;
         // A command that came before is answered, however many wait.

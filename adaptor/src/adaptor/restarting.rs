@@ -17,7 +17,7 @@ use tombolo_deform::{
     shape::SavedPoints,
 };
 use tombolo_pipelines::language::{
-    Command, CommandAuthor, HandedShape, Outcome, RestartedFrom, Since, Taken,
+    Command, CommandAuthor, HandedShape, Outcome, PinnedNote, RestartedFrom, Since, Taken,
 };
 
 use super::Adaptor;
@@ -44,6 +44,8 @@ struct Again {
     /// The commands that changed nothing, and why.
     rejected: Vec<(SavedCommand, String)>,
     shapes: Vec<HandedShape>,
+    /// The notes that were pinned.
+    notes: Vec<PinnedNote>,
     /// The last cycle of which the journal tells.
     until: Option<u64>,
 }
@@ -107,6 +109,11 @@ impl Continued {
         RestartedFrom { run: run.clone(), checkpoint: id.clone(), cycle: *cycle }
     }
 
+    /// The notes that were pinned in the run before.
+    pub(super) fn notes(&self) -> &[PinnedNote] {
+        &self.again.notes
+    }
+
     /// What is left once a run has been set up.
     pub(super) fn into_resumed(self) -> Resumed {
         let Checkpoint { run, points, .. } = self.checkpoint;
@@ -144,11 +151,11 @@ fn read_since(file: &Path, run: &SavedRun) -> Result<Since, CheckpointError> {
 
 impl Again {
     fn of(run: &SavedRun, since: Since) -> Self {
-        let Since { commands, shapes, until } = since;
+        let Since { commands, shapes, notes, until } = since;
         let open = until.unwrap_or(0);
         let mut outcomes: HashMap<String, (usize, Taken)> =
             (0..).zip(commands).map(|(at, taken)| (taken.id.clone(), (at, taken))).collect();
-        let mut again = Self { shapes, until, ..Self::default() };
+        let mut again = Self { shapes, notes, until, ..Self::default() };
         // Those that had taken effect in that order, then those that waited, the oldest first.
         let (mut settled, mut waiting) = (Vec::new(), Vec::new());
         let orders = run.mesh.iter().flat_map(|mesh| &mesh.steering.waiting);

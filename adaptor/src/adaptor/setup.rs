@@ -59,7 +59,7 @@ impl Adaptor {
         language::check_parameters(&config, &known).map_err(InitializeError::Configuration)?;
         let first = communicator.rank() == 0;
         let is_replay = replay.is_some();
-        let Recording { run, commands, shapes, .. } = replay.unwrap_or_default();
+        let Recording { run, commands, shapes, mut notes, .. } = replay.unwrap_or_default();
         let orders = if is_replay { commands } else { orders };
         let mut defaults = run.map_or_else(|| Defaults::of(&config), Defaults::from);
         let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
@@ -75,6 +75,7 @@ impl Adaptor {
             if given.orders == run.timed.0 {
                 orders.clone_from(&run.timed.1);
             }
+            notes = continued.iter().flat_map(Continued::notes).cloned().collect();
             for (name, value) in &run.parameters {
                 if let Err(reason) = parameters.resume(name, *value) {
                     log::warn!("of the checkpoint: {reason}");
@@ -96,6 +97,7 @@ impl Adaptor {
             None => Journal::none(),
         };
         let log = Arc::new(Log::new(journal, hub.clone()));
+        log.resume_notes(notes);
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
         clock.set(moment.cycle, moment.time);
         let config = Arc::new(config);

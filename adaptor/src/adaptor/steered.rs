@@ -106,7 +106,8 @@ impl Adaptor {
             }
         };
         let fields = channel.fields.iter().map(
-            |field| json!({"name": field.name, "association": field.association, "components": field.values.components()}),
+            |field| json!({"name": field.name, "association": field.association, "components": field.values.components(),
+                           "unit": self.config.units.get(field.name)}),
         );
         let mut described = Described {
             channel: channel.name.to_owned(),

@@ -5,7 +5,10 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::Value;
 use tombolo_deform::shape::Forecast;
-use tombolo_pipelines::encode::DecodedFrame;
+use tombolo_pipelines::{
+    encode::DecodedFrame,
+    language::{LinkFor, PinnedNote, UnpinnedNote},
+};
 
 use crate::{OrderReport, Parameter};
 
@@ -47,6 +50,14 @@ pub enum Event {
         /// The id of the command.
         id: String,
     },
+    /// The answer to [`Client::link_for`](super::Client::link_for).
+    Link(LinkTold),
+    /// The clients that are connected.
+    People(People),
+    /// A note was pinned in the picture.
+    Note(PinnedNote),
+    /// A note was taken away.
+    NoteRemoved(UnpinnedNote),
     /// Something is wrong, with a command of this client where it has an id.
     Error(Complaint),
     /// The run has ended: nothing comes after it.
@@ -102,6 +113,9 @@ pub struct Hello {
     /// The named parts of the surface.
     #[serde(default)]
     pub features: Vec<Value>,
+    /// The notes that are pinned, the oldest first; in the first of a connection.
+    #[serde(default)]
+    pub notes: Vec<PinnedNote>,
     /// The reference surface; `None` where the shape cannot be changed, or not yet.
     #[serde(default)]
     pub surface: Option<Value>,
@@ -237,6 +251,39 @@ pub struct Done {
     pub time: Option<f64>,
 }
 
+/// A link that opens one browser, once.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct LinkTold {
+    /// The rights that it gives.
+    pub r#for: LinkFor,
+    /// The address, relative to that of the viewer's page.
+    pub path: String,
+    /// The id of the question.
+    #[serde(default)]
+    pub id: Option<String>,
+}
+
+/// The clients that are connected.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct People {
+    /// Each of them, the first to come first.
+    pub viewers: Vec<Person>,
+}
+
+/// A client that is connected.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+pub struct Person {
+    /// The name of the client.
+    pub client: String,
+    /// The name that it has given itself. Two may have the same.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// Whether it steers.
+    pub role: Role,
+    /// Whether it could.
+    pub may_drive: bool,
+}
+
 /// An error that the run tells.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub struct Complaint {
@@ -282,6 +329,10 @@ impl Event {
             "monitor" => read(value).map(Event::Monitor),
             "pipelines" => read(value).map(Event::Pipelines),
             "done" => read(value).map(Event::Done),
+            "link" => read(value).map(Event::Link),
+            "people" => read(value).map(Event::People),
+            "note" => read(value).map(Event::Note),
+            "note_removed" => read(value).map(Event::NoteRemoved),
             "error" => read(value).map(Event::Error),
             "end" => read(value).map(Event::End),
             _ => None,
@@ -297,6 +348,7 @@ impl Event {
             Event::Pipelines(change) => change.id.as_deref(),
             Event::Done(done) => Some(&done.id),
             Event::Error(error) => error.id.as_deref(),
+            Event::Link(link) => link.id.as_deref(),
             Event::Unknown(value) => {
                 value.as_object()?.values().find_map(|value| value.get("id")?.as_str())
             }

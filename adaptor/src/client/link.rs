@@ -101,6 +101,17 @@ impl Link {
         format!("{}/{of}?token={}", self.prefix, self.token)
     }
 
+    /// The address of the viewer's page with a path behind it, such as `?key=...`.
+    pub(super) fn opened_by(&self, path: &str) -> String {
+        let (scheme, usual) = match &self.way {
+            Way::Plain => ("http", 80),
+            Way::Encrypted(_) => ("https", 443),
+            Way::Socket(socket) => return format!("unix:{}{path}", socket.display()),
+        };
+        let port = if self.port == usual { String::new() } else { format!(":{}", self.port) };
+        format!("{scheme}://{}{port}{}/{path}", self.host, self.prefix)
+    }
+
     /// The address of the WebSocket, for a client that had a name before, and what it comes back by.
     pub(super) fn socket(&self, watches: bool, client: Option<&str>, back: Option<&str>) -> String {
         let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
@@ -215,7 +226,9 @@ mod tests {
             (link.name(), &*link.socket(false, None, None)),
             ("::1", "ws://[::1]:7070/ws?token=abc")
         );
+        assert_eq!(link.opened_by("?key=k"), "http://[::1]:7070/?key=k");
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
+        assert_eq!(link.opened_by("?key=k"), "http://host/a/b/?key=k");
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
         assert_eq!(link.socket(false, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
         assert!(!format!("{link:?}").contains("t-1"));

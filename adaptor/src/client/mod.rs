@@ -89,14 +89,14 @@ use serde_json::{Value, json};
 use tombolo_deform::{edit::Edit, surface::Surface};
 use tombolo_pipelines::{
     encode::decode_surface,
-    language::{Change, Command, Order, Parameter, Question},
+    language::{Change, Command, LinkFor, Order, Parameter, Question},
     limits::{DOCUMENT, EDITS},
 };
 
 pub use error::ClientError;
 pub use event::{
-    Complaint, Done, End, Event, Foretold, Hello, MonitorName, PipelinesChanged, Precision,
-    Received, Role, StackChange, Status, StatusQuality, Values, View,
+    Complaint, Done, End, Event, Foretold, Hello, LinkTold, MonitorName, People, Person,
+    PipelinesChanged, Precision, Received, Role, StackChange, Status, StatusQuality, Values, View,
 };
 pub use link::Link;
 use state::{Pending, Shared};
@@ -343,6 +343,32 @@ impl Client {
     /// As of [`Client::send`].
     pub fn set(&self, name: &str, value: f64) -> Result<String, ClientError> {
         self.send(&Command::Parameter(Parameter { name: name.into(), value }))
+    }
+
+    /// A link that opens one browser, once, to watch or to drive: the address of this client's own
+    /// [`Link`] with a key in place of its token. A run that is reached through a socket at a path has
+    /// none that a browser could open: there it is a path with the key.
+    ///
+    /// # Errors
+    /// [`ClientError::Rejected`] where this client may not give such a link, and
+    /// [`ClientError::NoAnswer`] after `patience`.
+    pub fn link_for(&self, rights: LinkFor, patience: Duration) -> Result<String, ClientError> {
+        let id = self.id();
+        self.shared.with(|state| state.asked.insert(id.clone(), None));
+        let message = json!({"id": id, "link": {"for": rights}});
+        let answered = self.transmit(id.clone(), &message, false).map(|()| {
+            self.shared.wait(patience, |state| match state.asked.get_mut(&id)?.take() {
+                Some(answer) => Some(Ok(answer)),
+                None => state.failure.clone().map(Err),
+            })
+        });
+        self.shared.with(|state| state.asked.remove(&id));
+        match answered? {
+            Some(Ok(Event::Link(link))) => Ok(self.link.opened_by(&link.path)),
+            Some(Ok(Event::Error(error))) => Err(ClientError::Rejected { reason: error.message }),
+            Some(Err(failure)) => Err(failure),
+            _ => Err(no_answer("the question for a link", patience)),
+        }
     }
 
     /// The pipelines as they are now, a JSON list.

@@ -2,7 +2,7 @@
 //! has answered.
 
 use std::{
-    collections::VecDeque,
+    collections::{HashMap, VecDeque},
     sync::{Arc, Condvar, Mutex},
     time::{Duration, Instant},
 };
@@ -64,6 +64,9 @@ pub(super) struct State {
     /// The name under which this client drove.
     former: Option<String>,
     pub(super) missed: u64,
+    /// The questions that somebody waits for, and their answers: whoever reads events meanwhile does
+    /// not take these.
+    pub(super) asked: HashMap<String, Option<Event>>,
     /// Why nothing comes any more.
     pub(super) failure: Option<ClientError>,
     pub(super) closing: bool,
@@ -180,6 +183,10 @@ impl State {
                 // It is asked for again, or the commands that wait are refused with the reason.
                 return;
             }
+        }
+        if let Some(answer) = event.answers().and_then(|id| self.asked.get_mut(id)) {
+            *answer = Some(event);
+            return;
         }
         self.bytes = self.texts.iter().map(|told| told.text.len()).sum::<usize>() + text.len();
         self.texts.push_back(Received { event, text: text.into() });

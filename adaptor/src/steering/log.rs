@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use serde_json::{Value, json};
 use tombolo_pipelines::language::{
     Command, CommandAuthor, HandedShape, JournalEntry, JournalNote, OrderStatus as JournalStatus,
-    RunEnd,
+    PinnedNote, RunEnd,
 };
 
 use super::{
@@ -62,6 +62,14 @@ impl Log {
     /// Goes on from the commands of an earlier run.
     pub(crate) fn resume(&self, known: KnownCommands) {
         *lock(&self.state) = known;
+    }
+
+    /// Goes on with the notes that were pinned in an earlier run.
+    pub(crate) fn resume_notes(&self, notes: Vec<PinnedNote>) {
+        notes.iter().for_each(|note| self.journal.note(&JournalNote::Note(note.clone())));
+        if let Some(hub) = &self.hub {
+            hub.resume_notes(notes);
+        }
     }
 
     /// The commands so far.

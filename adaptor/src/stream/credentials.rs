@@ -23,8 +23,10 @@ const RELAY_VARIABLE: &str = "TOMBOLO_RELAY_SECRET";
 /// What the names of a run's cookies begin with.
 const COOKIE: &str = "tombolo";
 const EXPECTED: &str = "expected a secret of 16 to 128 letters, digits, '-' or '_'";
-/// Keys that may wait to be used; older ones make way.
+/// Keys of each access that may wait to be used, and of those that one viewer has asked for; older
+/// ones make way.
 const KEYS: usize = 64;
+const KEYS_OF_VIEWER: usize = 8;
 /// Sessions that are known of each access; older ones make way.
 const SESSIONS: usize = 128;
 /// The longest file of secrets that is read, in bytes.
@@ -74,9 +76,17 @@ struct Session {
     holder: Holder,
 }
 
+/// A key to use once.
+struct Key {
+    key: Secret,
+    access: Access,
+    /// The viewer that has asked for it.
+    asked_by: Option<u64>,
+}
+
 #[derive(Default)]
 struct Issued {
-    keys: VecDeque<(Access, Secret)>,
+    keys: VecDeque<Key>,
     sessions: VecDeque<Session>,
 }
 
@@ -198,35 +208,35 @@ impl Credentials {
         }
     }
 
-    /// A new key to use once.
-    pub(super) fn key(&self, access: Access) -> Result<Secret, getrandom::Error> {
+    /// A new key to use once, which a viewer may have asked for. Those who watch push out no keys of
+    /// those who drive.
+    pub(super) fn key(
+        &self,
+        access: Access,
+        asked_by: Option<u64>,
+    ) -> Result<Secret, getrandom::Error> {
         let key = Secret::random()?;
-        let mut issued = lock(&self.issued);
-        if issued.keys.len() >= KEYS {
-            issued.keys.pop_front();
-        }
-        issued.keys.push_back((access, key.clone()));
+        let keys = &mut lock(&self.issued).keys;
+        let of_viewer = |known: &Key| asked_by.is_some() && known.asked_by == asked_by;
+        make_way(keys, KEYS_OF_VIEWER, of_viewer);
+        make_way(keys, KEYS, |known| known.access == access);
+        keys.push_back(Key { key: key.clone(), access, asked_by });
         Ok(key)
     }
 
     /// Uses up a key, and returns the rights that it gives.
     pub(super) fn redeem(&self, key: &str) -> Option<Access> {
         let mut issued = lock(&self.issued);
-        let found = issued.keys.iter().position(|(_, known)| known.matches(key))?;
-        issued.keys.remove(found).map(|(access, _)| access)
+        let found = issued.keys.iter().position(|known| known.key.matches(key))?;
+        issued.keys.remove(found).map(|known| known.access)
     }
 
     /// Begins a session; its id is for the cookie.
     pub(super) fn begin(&self, access: Access) -> Result<Secret, getrandom::Error> {
         let id = Secret::random()?;
         let mut issued = lock(&self.issued);
-        let alike = |session: &Session| session.holder.access == access;
         // Those who watch must not push out those who drive.
-        if issued.sessions.iter().filter(|session| alike(session)).count() >= SESSIONS
-            && let Some(oldest) = issued.sessions.iter().position(alike)
-        {
-            issued.sessions.remove(oldest);
-        }
+        make_way(&mut issued.sessions, SESSIONS, |session| session.holder.access == access);
         issued.sessions.push_back(Session { id: id.clone(), holder: Holder::new(access) });
         Ok(id)
     }
@@ -278,6 +288,15 @@ impl Credentials {
         let port = host.unwrap_or_default().rsplit_once(':');
         let port = port.and_then(|(_, port)| port.parse::<u16>().ok());
         format!("{}-{}", self.cookie, port.unwrap_or(80))
+    }
+}
+
+/// Makes room for one more of those that are `alike`, where there are so many already.
+fn make_way<T>(all: &mut VecDeque<T>, most: usize, alike: impl Fn(&T) -> bool) {
+    if all.iter().filter(|one| alike(one)).count() >= most
+        && let Some(oldest) = all.iter().position(alike)
+    {
+        all.remove(oldest);
     }
 }
 
@@ -391,7 +410,7 @@ mod tests {
     #[test]
     fn a_key_is_used_once() {
         let credentials = credentials();
-        let key = credentials.key(Access::Watch).expect("a key");
+        let key = credentials.key(Access::Watch, None).expect("a key");
         assert_eq!(credentials.redeem(&key.as_str()[1..]), None);
         assert_eq!(credentials.redeem(key.as_str()), Some(Access::Watch));
         assert_eq!(credentials.redeem(key.as_str()), None);

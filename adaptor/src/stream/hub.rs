@@ -25,6 +25,7 @@ use super::{
     pace::{LEVELS, Pace},
     stack::ReportedStack,
     text::Text,
+    together::Together,
     wheel::Wheel,
 };
 use crate::lock::{lock, wait};
@@ -122,6 +123,7 @@ pub(super) struct HubState {
     /// Somebody inside the program who is told what viewers are told.
     pub(super) observer: Option<Arc<Client>>,
     pub(super) wheel: Wheel,
+    pub(super) together: Together,
     /// The cost of each pipeline, by name.
     pub(super) costs: Vec<(String, Cost)>,
     /// Why the journal cannot be written.
@@ -449,16 +451,17 @@ impl Hub {
     /// The `hello` of a viewer; the first has the orders so far, and what there is of the stack.
     pub(super) fn hello(&self, client: u64, orders: Option<Value>) -> String {
         // Nothing is written while the solver could wait for the lock.
-        let (stack, is_driver, viewer) = {
+        let (stack, is_driver, viewer, notes) = {
             let state = lock(&self.state);
             let is_driver = state.wheel.driver() == Some(client);
             let viewer = state.clients.get(&client).cloned();
-            (state.stack.clone(), is_driver, viewer)
+            (state.stack.clone(), is_driver, viewer, state.together.notes())
         };
         let mut hello = self.described();
         if let Some(orders) = orders {
             hello.insert("stack".into(), stack.described());
             hello.insert("orders".into(), orders);
+            hello.insert("notes".into(), json!(*notes));
         }
         hello.insert("client".into(), name(client).into());
         let role = if is_driver { "driver" } else { "watcher" };

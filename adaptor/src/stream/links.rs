@@ -76,7 +76,7 @@ impl Links {
     /// A link that opens one browser, once, for driving; `None` where the system has no random
     /// numbers.
     pub(super) fn browser_link(&self) -> Option<String> {
-        let key = self.credentials.key(Access::Drive).ok()?;
+        let key = self.credentials.key(Access::Drive, None).ok()?;
         Some(self.way().link("key", key.as_str()))
     }
 

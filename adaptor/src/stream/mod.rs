@@ -34,6 +34,7 @@ mod metrics;
 mod observer;
 mod outbox;
 mod pace;
+mod people;
 mod playback;
 mod pool;
 pub mod relay;
@@ -48,6 +49,7 @@ mod status;
 mod surface;
 mod text;
 mod tls;
+mod together;
 mod viewer_files;
 mod wheel;
 
@@ -387,6 +389,7 @@ async fn serve(
             went_wrong("status", || {
                 commands.look_at_time();
                 hub.status();
+                hub.people();
             });
         }
     };

@@ -99,6 +99,7 @@ impl Hub {
     pub(crate) fn hello_for_all(&self, orders: Option<Value>) -> String {
         let mut hello = self.described();
         hello.extend(orders.map(|orders| ("orders".into(), orders)));
+        hello.insert("notes".into(), json!(*lock(&self.state).together.notes()));
         json!({ "hello": hello }).to_string()
     }
 

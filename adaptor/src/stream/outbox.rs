@@ -128,6 +128,8 @@ struct Outbox {
     monitors: VecDeque<Text>,
     stack: Option<StackChange>,
     status: Option<Text>,
+    /// The newest camera of the one that drives.
+    camera: Option<Text>,
     hello: bool,
     has_been_greeted: bool,
     views: BTreeMap<usize, Unread>,
@@ -263,6 +265,9 @@ impl Client {
         if let Some(text) = outbox.status.take() {
             return Ok(Some(Message::Text(text)));
         }
+        if let Some(text) = outbox.camera.take() {
+            return Ok(Some(Message::Text(text)));
+        }
         if let Some(text) = outbox.monitors.pop_front() {
             return Ok(Some(Message::Text(text)));
         }
@@ -297,6 +302,11 @@ impl Client {
     /// Puts a status in the place of the last one.
     pub(super) fn status(&self, text: &Text) {
         self.put(|outbox| outbox.status = Some(text.clone()));
+    }
+
+    /// Puts a camera in the place of the last one.
+    pub(super) fn camera(&self, text: &Text) {
+        self.put(|outbox| outbox.camera = Some(text.clone()));
     }
 
     /// Adds values of monitors; where very many are unread, the oldest make way.

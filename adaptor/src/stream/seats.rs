@@ -51,6 +51,7 @@ impl HubState {
         }
         self.clients.insert(client.id, Arc::clone(client));
         self.status_dirty = true;
+        self.together.changed();
     }
 
     fn take_wheel(&mut self, client: u64) {
@@ -58,6 +59,7 @@ impl HubState {
         self.wheel.heard = Some(Instant::now());
         self.wheel.lost = None;
         self.status_dirty = true;
+        self.together.changed();
     }
 
     fn named(&self, called: &str) -> Result<&Arc<Client>, String> {
@@ -91,6 +93,7 @@ impl Hub {
         }
         state.wheel.left.push_back((client.id, client.back.clone(), client.access));
         state.status_dirty = true;
+        state.together.left(client.id);
     }
 
     /// Whether the run is paused and nobody is connected who could resume it.
@@ -104,14 +107,12 @@ impl Hub {
         lock(&self.state).wheel.driver == Some(client)
     }
 
-    /// Takes note that a viewer has said something; whether it is the driver.
-    pub(super) fn heard(&self, client: u64) -> bool {
+    /// Takes note that a viewer has said something.
+    pub(super) fn heard(&self, client: u64) {
         let mut state = lock(&self.state);
-        let drives = state.wheel.driver == Some(client);
-        if drives {
+        if state.wheel.driver == Some(client) {
             state.wheel.heard = Some(Instant::now());
         }
-        drives
     }
 
     /// Gives a viewer the wheel, or tells the driver that it wants it; the message says why not.
@@ -121,7 +122,10 @@ impl Hub {
             Some(driver) if driver == client => Ok(()),
             Some(driver) if !state.wheel.is_silent() => {
                 if let Some(driver) = state.clients.get(&driver) {
-                    driver.text(&Text::of(move || json!({"wheel": {"asked_by": name(client)}})));
+                    let called = state.together.called(client).map(str::to_owned);
+                    driver.text(&Text::of(
+                        move || json!({"wheel": {"asked_by": name(client), "name": called}}),
+                    ));
                 }
                 Err(format!(
                     "{} has the wheel and is told that you ask for it; it is free once that viewer \

@@ -12,21 +12,22 @@ use futures_util::{
 };
 use serde_json::json;
 use tombolo_pipelines::language::{
-    JournalNote, Message as Said, ViewerMove, ViewerNote, Wheel, parse_message,
+    JournalNote, LinkFor, Message as Said, Together, ViewerMove, ViewerNote, Wheel, parse_message,
 };
 
 use super::{
     CommandSink, PING_PERIOD, Shared,
     allowance::RATE,
-    credentials::{Access, Holder},
+    credentials::{Access, Credentials, Holder},
     hub::Hub,
     outbox::{Client, Message},
     text::Text,
 };
 use crate::lock::lock;
 
-/// Bytes that are read of a viewer that watches.
+/// Bytes that are read of a viewer that cannot drive, and of one that does not but could.
 const WATCHED: usize = 1 << 10;
+const NOT_DRIVEN: usize = 1 << 13;
 
 /// Serves one viewer until either side ends it.
 pub(super) async fn serve(
@@ -36,8 +37,8 @@ pub(super) async fn serve(
     address: IpAddr,
     shared: Shared,
 ) {
-    let Shared { hub, commands, .. } = shared;
-    let mut seat = Seat { client: &client, hub: &hub, commands: &*commands, address };
+    let Shared { hub, commands, gate, .. } = shared;
+    let seat = Seat { client: &client, hub: &hub, commands: &*commands, address };
     seat.note(ViewerMove::Came);
     if hub.is_driver(client.id) {
         commands.driven();
@@ -46,7 +47,7 @@ pub(super) async fn serve(
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
         () = write(sink, &client, &hub, &*commands) => {}
-        () = read(stream, &client, &holder, &hub, &*commands) => {}
+        () = read(stream, &seat, &holder, &gate.credentials) => {}
     }
 }
 
@@ -59,11 +60,12 @@ struct Seat<'a> {
 }
 
 impl Seat<'_> {
-    /// Notes in the journal who came and went.
-    fn note(&mut self, did: ViewerMove) {
+    /// Notes in the journal who came and went, and who was given a link for others.
+    fn note(&self, did: ViewerMove) {
         self.commands.note(JournalNote::Viewer(ViewerNote {
             name: Hub::name(self.client.id),
             address: self.address.to_string(),
+            called: self.hub.called(self.client.id),
             may_drive: self.client.access == Access::Drive,
             did,
         }));
@@ -72,8 +74,8 @@ impl Seat<'_> {
 
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
-        self.hub.leave(self.client);
         self.note(ViewerMove::Left);
+        self.hub.leave(self.client);
     }
 }
 
@@ -141,11 +143,11 @@ async fn write(
 
 async fn read(
     mut stream: SplitStream<WebSocket>,
-    client: &Client,
+    seat: &Seat<'_>,
     holder: &Holder,
-    hub: &Hub,
-    commands: &dyn CommandSink,
+    credentials: &Credentials,
 ) {
+    let client = seat.client;
     while let Some(Ok(message)) = stream.next().await {
         let answer = match message {
             Wire::Close(_) => return,
@@ -157,7 +159,7 @@ async fn read(
                 tokio::time::sleep(Duration::from_secs(1)).await;
                 Err((None, format!("more than {RATE} messages a second; this one was not read")))
             }
-            Wire::Text(text) => receive(&text, client, hub, commands),
+            Wire::Text(text) => receive(&text, seat, credentials),
             Wire::Binary(_) => Err((
                 None,
                 "a binary message that is not the number of frames decoded, 8 bytes, more than \
@@ -172,30 +174,37 @@ async fn read(
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
-/// "forecast" | "drive" | "hand_over" | "kick" | "here": ...}`.
+/// "forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
+/// "note" | "remove_note": ...}`.
 fn receive(
     text: &str,
-    client: &Client,
-    hub: &Hub,
-    commands: &dyn CommandSink,
+    seat: &Seat<'_>,
+    credentials: &Credentials,
 ) -> Result<(), (Option<String>, String)> {
-    let drives = hub.heard(client.id);
-    let watches = match client.access {
-        Access::Drive => {
-            "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel"
-        }
+    let Seat { client, hub, commands, .. } = *seat;
+    let drives = hub.is_driver(client.id);
+    let (watches, most) = match client.access {
+        Access::Drive => (
+            "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel",
+            NOT_DRIVEN,
+        ),
         Access::Watch => {
-            "this viewer watches: the secret or link that it came with is for watching"
+            ("this viewer watches: the secret or link that it came with is for watching", WATCHED)
         }
     };
-    // What cannot be a `drive` is not worth reading from one that watches.
-    if !drives && text.len() > WATCHED {
+    // What can be neither a `drive` nor a note is not worth reading from one that watches.
+    if !drives && text.len() > most {
         return Err((None, watches.into()));
     }
     let (id, message) = parse_message(text);
+    // A page says these by itself, also where nobody is there.
+    if !matches!(message, Ok(Said::Together(Together::Camera(_) | Together::Name { .. }))) {
+        hub.heard(client.id);
+    }
     let answered = match message {
         Ok(Said::Wheel(Wheel::Here {})) => Ok(()),
         Ok(Said::Wheel(Wheel::Drive {})) if client.access == Access::Drive => hub.drive(client.id),
+        Ok(Said::Together(together)) => take(together, id.clone(), seat, credentials),
         _ if !drives => Err(watches.into()),
         Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
         Ok(Said::Wheel(Wheel::Kick { client: other })) => hub.kick(client.id, &other),
@@ -203,6 +212,49 @@ fn receive(
         Err(error) => Err(error.to_string()),
     };
     answered.map_err(|reason| (id, reason))
+}
+
+/// Takes a message about the viewers themselves; the error says why it comes to nothing.
+fn take(
+    message: Together,
+    id: Option<String>,
+    seat: &Seat<'_>,
+    credentials: &Credentials,
+) -> Result<(), String> {
+    let Seat { client, hub, commands, .. } = *seat;
+    let may_drive = || match client.access {
+        Access::Drive => Ok(()),
+        Access::Watch => Err("the secret or link that this viewer came with is for watching"),
+    };
+    match message {
+        Together::Link { r#for } => {
+            let (access, did) = match r#for {
+                LinkFor::Watch => (Access::Watch, ViewerMove::TookWatchingLink),
+                LinkFor::Drive => (Access::Drive, ViewerMove::TookDrivingLink),
+            };
+            if access == Access::Drive {
+                may_drive()?;
+            }
+            let key = credentials.key(access, Some(client.id));
+            let key = key.map_err(|error| format!("no link could be made: {error}"))?;
+            seat.note(did);
+            client.text(&Text::of(move || {
+                json!({"link": {"for": r#for, "path": format!("?key={}", key.as_str()), "id": id}})
+            }));
+        }
+        Together::Name { name } => hub.call(client.id, name.trim()),
+        Together::Follow { on } => hub.follow(client.id, on),
+        Together::Camera(camera) => hub.show_camera(client.id, camera)?,
+        Together::Note(note) => {
+            may_drive()?;
+            commands.note(JournalNote::Note(hub.pin(client.id, note)?));
+        }
+        Together::RemoveNote { number } => {
+            may_drive()?;
+            commands.note(JournalNote::NoteRemoved(hub.unpin(number)?));
+        }
+    }
+    Ok(())
 }
 
 /// Whether this is the number of frames that the viewer has decoded.

@@ -12,7 +12,7 @@ use tombolo::deform::surface::Surface;
 use tombolo::pipelines::encode::DecodedFrame;
 use tombolo::pipelines::extract::{Association, Field};
 use tombolo::pipelines::files::read_displacements;
-use tombolo::pipelines::language::{self, Cancel, Command, Order, PipelineChange};
+use tombolo::pipelines::language::{self, Cancel, Command, LinkFor, Order, PipelineChange};
 
 use crate::error::{ConfigurationError, FailedError, guarded, of_client, of_language};
 use crate::language::{names_file, order};
@@ -159,6 +159,10 @@ impl Client {
             Event::Forecast(_) => "forecast",
             Event::Pipelines(_) => "pipelines",
             Event::Done(_) => "done",
+            Event::Link(_) => "link",
+            Event::People(_) => "people",
+            Event::Note(_) => "note",
+            Event::NoteRemoved(_) => "note_removed",
             Event::Error(_) => "error",
             Event::End(_) => "end",
             _ => "unknown",
@@ -240,6 +244,20 @@ impl Client {
     fn change_pipelines(&self, py: Python<'_>, text: &str) -> PyResult<String> {
         let change = py.detach(|| language::parse_valid::<PipelineChange>(text, "pipelines"));
         self.give(Command::Pipelines(change.map_err(of_language)?))
+    }
+
+    /// A link that opens one browser, once, to watch or to drive.
+    fn link_for(&self, py: Python<'_>, rights: &str, patience: f64) -> PyResult<String> {
+        let rights = match rights {
+            "watch" => LinkFor::Watch,
+            "drive" => LinkFor::Drive,
+            _ => {
+                return Err(ConfigurationError::new_err(format!(
+                    "link: found '{rights}', expected 'watch' or 'drive'"
+                )));
+            }
+        };
+        guarded(|| py.detach(|| self.client.link_for(rights, seconds(patience)).map_err(of_client)))
     }
 
     /// The pipelines as they are now, a JSON list.

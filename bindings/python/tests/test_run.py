@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from urllib.request import urlopen
 from xml.etree import ElementTree
 
 import numpy as np
@@ -37,6 +38,21 @@ def test_facts(run):
     assert run.status.step_seconds is None or run.status.step_seconds > 0
     assert run.pipelines[0]["name"] == "midplane"
     assert "token" not in repr(run)
+
+
+def test_a_link_for_somebody_else(run, solver):
+    place = run.link.split("?")[0]
+    for rights in ("watch", "drive"):
+        link = run.link_for(rights)
+        assert link.startswith(f"{place}?key=") and len(link.split("=")[1]) == 32
+        assert urlopen(link).status == 200
+    assert asyncio.run(run.aio.link_for()).startswith(place)
+    with pytest.raises(tombolo.ConfigurationError, match="'watch' or 'drive'"):
+        run.link_for("look")
+    with tombolo.connect(solver.adaptor.watching_link, watch=True) as watcher:
+        assert watcher.link_for("watch").startswith(place)
+        with pytest.raises(tombolo.RejectedError, match="for watching"):
+            watcher.link_for("drive")
 
 
 def test_views_are_arrays(run):

@@ -1,5 +1,6 @@
 //! A configuration: the views to stream, the monitors to watch, and how orders become mesh motion.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
@@ -44,6 +45,10 @@ pub struct Config {
     /// that are changed in it are changed in the run. Everything else needs a restart.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub watch: bool,
+    /// The units of fields, by name, such as `{"velocity": "m/s"}`. They are shown to people; nothing is
+    /// converted.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub units: BTreeMap<String, String>,
     /// The pipelines, each with the steps at which it runs.
     #[serde(default)]
     pub pipelines: Vec<Pipeline>,

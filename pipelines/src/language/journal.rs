@@ -13,6 +13,7 @@ use super::parse::{Document, check_length};
 use super::relative_files::resolve_command_files;
 use super::scan::Member;
 use super::timed::{CommandAuthor, JournalEntry, OrderStatus, TimedCommand, lines, torn_line};
+use super::together::{PinnedNote, pin};
 use super::{At, Deformation, LanguageError, Problem, near};
 use crate::limits::{WAITING, WAITING_BYTES};
 
@@ -30,6 +31,10 @@ pub enum JournalNote {
     Refused(RefusedRequest),
     /// Lines are missing here.
     Lost(LostLines),
+    /// A note was pinned in the picture.
+    Note(PinnedNote),
+    /// A note was taken away.
+    NoteRemoved(UnpinnedNote),
     /// The state of the run was saved, so that another one can go on from here.
     Checkpoint(CheckpointNote),
     /// The run came to its end.
@@ -102,6 +107,9 @@ pub struct ViewerNote {
     pub name: String,
     /// The address that it came from.
     pub address: String,
+    /// The name that it has given itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub called: Option<String>,
     /// Whether it came with the secret or link for driving.
     pub may_drive: bool,
     /// The action.
@@ -116,6 +124,18 @@ pub enum ViewerMove {
     Came,
     /// Its connection has ended.
     Left,
+    /// It was given a link for a browser that watches.
+    TookWatchingLink,
+    /// It was given a link for a browser that may drive.
+    TookDrivingLink,
+}
+
+/// A note that was taken away.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct UnpinnedNote {
+    /// The number of the note.
+    pub number: u64,
 }
 
 /// Who was not let in.
@@ -155,6 +175,8 @@ pub struct Recording {
     pub commands: Vec<TimedCommand>,
     /// The shapes that the solver was handed, in that order.
     pub shapes: Vec<HandedShape>,
+    /// The notes that were pinned at its end, the oldest first.
+    pub notes: Vec<PinnedNote>,
     /// The lines that are missing.
     pub lost: u64,
 }
@@ -183,13 +205,13 @@ pub struct Recording {
 /// ```
 pub fn parse_journal(text: &str, file: &str) -> Result<Recording, LanguageError> {
     check_length(text.len(), file, WAITING_BYTES)?;
-    let known = read_lines(text, file)?;
-    let commands = known.commands.into_iter().filter(|known| known.is_carried_out);
+    let KnownLines { run, commands, shapes, notes, lost } = read_lines(text, file)?;
+    let commands = commands.into_iter().filter(|known| known.is_carried_out);
     let mut commands: Vec<_> = commands.collect();
     commands.sort_by_key(|known| known.took_effect);
     let mut commands: Vec<TimedCommand> = commands.into_iter().map(|known| known.timed).collect();
     commands.iter_mut().for_each(|timed| resolve_command_files(&mut timed.command, file));
-    Ok(Recording { run: known.run, commands, shapes: known.shapes, lost: known.lost })
+    Ok(Recording { run, commands, shapes, notes, lost })
 }
 
 /// The commands of a text whose lines are those of a journal, timed commands, or both.
@@ -217,6 +239,7 @@ struct KnownLines {
     run: Option<RunHeader>,
     commands: Vec<Known>,
     shapes: Vec<HandedShape>,
+    notes: Vec<PinnedNote>,
     lost: u64,
 }
 
@@ -291,11 +314,20 @@ impl RunLines<'_> {
         let moved = at_line(number);
         let Self { known, indices, .. } = self;
         if is_note(line) {
-            match line.value().map_err(moved)? {
+            match line.value().map_err(&moved)? {
                 // The settings of orders are those that the whole run began with.
-                JournalNote::Run(run) => _ = known.run.get_or_insert(run),
+                JournalNote::Run(run) => {
+                    // One that goes on from another writes down again what is still pinned.
+                    known.notes.clear();
+                    _ = known.run.get_or_insert(run);
+                }
                 JournalNote::Shape(shape) => known.shapes.push(shape),
                 JournalNote::Lost(LostLines { lines }) => known.lost += lines,
+                JournalNote::Note(note) => pin(&mut known.notes, note)
+                    .map_err(|exceeded| moved(line.locate(exceeded.into())))?,
+                JournalNote::NoteRemoved(UnpinnedNote { number }) => {
+                    known.notes.retain(|note| note.number != number);
+                }
                 JournalNote::Viewer(_)
                 | JournalNote::Refused(_)
                 | JournalNote::Checkpoint(_)
@@ -353,7 +385,8 @@ fn is_entry(line: &Document<'_>) -> bool {
     line.root.member("status").is_some()
 }
 
-const NOTES: [&str; 7] = ["run", "shape", "viewer", "refused", "lost", "checkpoint", "end"];
+const NOTES: [&str; 9] =
+    ["run", "shape", "viewer", "refused", "lost", "note", "note_removed", "checkpoint", "end"];
 
 /// Whether a line is a note.
 pub(super) fn is_note(line: &Document<'_>) -> bool {

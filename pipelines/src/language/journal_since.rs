@@ -5,9 +5,10 @@ use std::io::BufRead;
 
 use serde::{Deserialize, Serialize};
 
-use super::journal::{HandedShape, JournalNote};
+use super::journal::{HandedShape, JournalNote, UnpinnedNote};
 use super::order::Command;
 use super::timed::{CommandAuthor, JournalEntry, OrderStatus};
+use super::together::{PinnedNote, pin};
 use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
 
 /// What a run did after its checkpoint, as far as its journal holds it: all that whoever goes on from
@@ -20,6 +21,9 @@ pub struct Since {
     pub commands: Vec<Taken>,
     /// The shapes that the solver was handed, in that order.
     pub shapes: Vec<HandedShape>,
+    /// The notes that were pinned at the end of the journal, the oldest first; also those from before
+    /// the checkpoint.
+    pub notes: Vec<PinnedNote>,
     /// The last cycle of which the journal tells what the solver did.
     pub until: Option<u64>,
 }
@@ -142,6 +146,7 @@ struct Reader {
     /// The commands of files and pipelines.
     given_again: HashSet<String>,
     shapes: Vec<HandedShape>,
+    notes: Vec<PinnedNote>,
     until: Option<u64>,
     /// The cycle at which a command that is given again took effect last.
     last_given_again: Option<u64>,
@@ -163,6 +168,10 @@ impl Reader {
                 JournalNote::Shape(shape) => {
                     self.until = self.until.max(Some(shape.cycle));
                     self.shapes.push(shape);
+                }
+                JournalNote::Note(note) => pin(&mut self.notes, note)?,
+                JournalNote::NoteRemoved(UnpinnedNote { number }) => {
+                    self.notes.retain(|note| note.number != number);
                 }
                 _ => {}
             },
@@ -219,7 +228,7 @@ impl Reader {
         let mut taken: Vec<(usize, Taken)> = taken.collect();
         taken.sort_by_key(|(line, _)| *line);
         let commands = taken.into_iter().map(|(_, taken)| taken).collect();
-        Since { commands, shapes: self.shapes, until: self.until }
+        Since { commands, shapes: self.shapes, notes: self.notes, until: self.until }
     }
 }
 

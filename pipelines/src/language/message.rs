@@ -5,6 +5,7 @@ use serde::Deserialize;
 use super::order::{Command, Question};
 use super::parse::Document;
 use super::scan::Value;
+use super::together::Together;
 use super::{LanguageError, Problem};
 
 /// Characters that the id of a message may have.
@@ -19,6 +20,8 @@ pub enum Message {
     Question(Question),
     /// Settles who drives.
     Wheel(Wheel),
+    /// Is about the viewers themselves, and changes nothing of the run.
+    Together(Together),
 }
 
 /// A message that settles who drives.
@@ -95,6 +98,9 @@ fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
     match key {
         "forecast" => document.valid().map(Message::Question),
         "drive" | "hand_over" | "kick" | "here" => document.value().map(Message::Wheel),
+        "link" | "name" | "follow" | "camera" | "note" | "remove_note" => {
+            document.valid().map(Message::Together)
+        }
         _ => document.valid().map(Message::Command),
     }
 }

@@ -52,6 +52,7 @@ mod sinks;
 mod stage;
 mod streamlines;
 mod timed;
+mod together;
 mod tree;
 mod unread;
 mod validate;
@@ -74,7 +75,7 @@ pub(crate) use file_pattern::picture_pattern;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
     CheckpointNote, HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RestartedFrom,
-    RunEnd, RunHeader, ViewerMove, ViewerNote, is_journal, parse_journal,
+    RunEnd, RunHeader, UnpinnedNote, ViewerMove, ViewerNote, is_journal, parse_journal,
 };
 pub use journal_since::{Outcome, Since, SinceError, Taken};
 pub use message::{Message, Wheel, parse_message};
@@ -98,6 +99,7 @@ pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};
 pub use streamlines::{Direction, SeedFeatures, SeedPlane, Seeds, Streamlines};
 pub use timed::{CommandAuthor, JournalEntry, OrderStatus, TimedCommand};
+pub use together::{CameraStand, LinkFor, NewNote, PinnedNote, Together};
 pub(crate) use tombolo_deform::names::near;
 pub use tombolo_deform::names::nearest;
 pub use tombolo_deform::shape::Deformation;

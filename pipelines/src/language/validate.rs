@@ -81,6 +81,15 @@ impl Config {
             let message = "there is no `stream`, so that no viewer could connect";
             found.push(Problem::new(message).within("wait_for_viewer").within("steering"));
         }
+        for (field, unit) in &self.units {
+            if unit.trim().is_empty()
+                || unit.chars().any(char::is_control)
+                || NAME.check(unit.chars().count()).is_err()
+            {
+                let message = format!("expected a unit of 1 to {} visible characters", NAME.most);
+                found.push(Problem::new(message).within(field).within("units"));
+            }
+        }
         if self.journal.as_deref() == Some("") {
             found.push(Problem::new("expected the name of a file").within("journal"));
         }

@@ -10,7 +10,7 @@ export interface ViewInformation { name: string; kind: string }
 /** What a feature is to the solver; null where it has not said. */
 export type Condition = "inflow" | "outflow" | "wall";
 export interface FeatureInformation { name: string; faces: number; vertices: number; bounds: [Vector, Vector]; condition?: Condition | null }
-export interface FieldInformation { name: string; association: Association; components: number }
+export interface FieldInformation { name: string; association: Association; components: number; unit?: string | null }
 export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null }
 
 /** The surface from which shapes are measured; its points are sent on request only. */
@@ -24,6 +24,20 @@ export interface StackInformation { revision: number; edits: number; kept?: numb
 
 /** How exact a view is: its values are within so many times the bound that was asked for, 1 where the link carries it as it is. */
 export interface Precision { view: string; coarser: number }
+
+/** A viewer that is connected, the name that it has given itself, and whether it could steer. Two may have the same name. */
+export interface Person { client: string; name: string | null; role: Role; may_drive: boolean }
+
+/** A note that is pinned to a place of the mesh and a cycle. */
+export interface PinnedNote { number: number; text: string; at: Vector; cycle: number; by: string }
+
+/** The rights of the browser that a link opens. */
+export type LinkFor = "watch" | "drive";
+/** A link that opens one browser, once; `path` is relative to the page. */
+export interface LinkTold { for: LinkFor; path: string; id?: string | null }
+
+/** The camera of the one that drives. */
+export interface ToldCamera { position: Vector; focal_point: Vector; view_up: Vector; parallel: boolean; parallel_scale: number; view_angle: number }
 
 export interface Hello {
   protocol: number;
@@ -47,6 +61,8 @@ export interface Hello {
   undoable?: number | undefined;
   orders: OrderStatus[];
   defaults: { deform?: Json; guard?: Json; schedule?: Json };
+  /** The notes, the oldest first: in the first of a connection, and in each of a recording. */
+  notes?: PinnedNote[];
   /** What is shown is no run but a recording of one, from its first moment to its last. */
   recording?: { first: RecordedMoment; last: RecordedMoment; lost_bytes?: number } | null;
 }
@@ -128,7 +144,7 @@ export interface Done { id: string; cycle: number; time: number }
 export interface ServerError { message: string; id?: string | null }
 
 /** Another viewer asks the one that drives for the wheel. */
-export interface WheelAsked { asked_by: string }
+export interface WheelAsked { asked_by: string; name?: string | null }
 
 /** Where in a recording the viewer is. */
 export interface Played extends RecordedMoment { speed: number; paused: boolean; at_end: boolean }
@@ -147,6 +163,12 @@ export type ServerMessage =
   | { kind: "pipelines"; body: PipelineChange }
   | { kind: "done"; body: Done }
   | { kind: "wheel"; body: WheelAsked }
+  | { kind: "link"; body: LinkTold }
+  | { kind: "people"; body: { viewers: Person[] } }
+  | { kind: "followed"; body: { by: number } }
+  | { kind: "camera"; body: ToldCamera }
+  | { kind: "note"; body: PinnedNote }
+  | { kind: "note_removed"; body: { number: number } }
   | { kind: "play"; body: Played }
   | { kind: "end"; body: RunEnd }
   | { kind: "error"; body: ServerError };
@@ -156,6 +178,8 @@ export type ClientMessage = { id?: string } & (
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
   | { play: { seek?: { seconds: number }; speed?: number; paused?: boolean } }
   | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }
+  | { link: { for: LinkFor } } | { name: { name: string } } | { follow: { on: boolean } } | { camera: ToldCamera }
+  | { note: { text: string; at: Vector; cycle?: number } } | { remove_note: { number: number } }
 );
 
 /** Raised for a message that does not follow the protocol; the text says where it departs from it. */
@@ -218,11 +242,13 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error"] as const) {
+  for (const kind of ["hello", "status", "order", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error",
+    "link", "people", "followed", "camera", "note", "note_removed"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);
     if (kind === "forecast" && !isObject(body.order)) throw new ProtocolError('the message "forecast" has no order');
+    if (kind === "people" && !Array.isArray(body.viewers)) throw new ProtocolError('the message "people" has no viewers');
     return { kind, body: kind === "hello" ? completeHello(body) : body } as unknown as ServerMessage;
   }
   throw new ProtocolError(`an unknown message: ${Object.keys(parsed).slice(0, 3).join(", ") || "{}"}`);

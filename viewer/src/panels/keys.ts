@@ -22,8 +22,8 @@ export function watchKeys(store: Store<State, Action>, commands: Commands): void
     }
     if (event.key.toLowerCase() !== "z") return;
     const { state } = store;
-    // The name of an edit is text: the browser takes back what is typed there.
-    if ((event.target as HTMLElement | null)?.closest?.("input.name")) return;
+    // A name or a note is text: the browser takes back what is typed there.
+    if ((event.target as HTMLElement | null)?.closest?.("input.name, textarea")) return;
     event.preventDefault();
     if (!event.shiftKey) {
       if (state.draft.past.length > 0) store.dispatch({ type: "step back" });

@@ -27,6 +27,7 @@ export class LookPanel {
   private readonly kind = element("select", { onchange: () => this.changeKind(this.kind.value as RangeKind) }, ...RANGES.map(([kind, text]) => option(kind, text)));
   private readonly low = this.end("lowest value");
   private readonly high = this.end("highest value");
+  private readonly unit = element("span", { class: "unit" });
   private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.changeRange({ symmetric: this.symmetric.checked, logarithmic: false }) });
   private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
   private readonly edges = element("select", { onchange: () => this.change({ edges: this.edges.value as Look["edges"] }) }, ...EDGES.map((edges) => option(edges, edges === "none" ? "none" : `of ${edges === "mesh" ? "the mesh" : "features"}`)));
@@ -44,7 +45,7 @@ export class LookPanel {
     component.id = "component-row";
     this.rows = element("div", {}, row("field", this.field), component,
       element("div", { class: "coloured" }, row("colours", this.map), this.sample, row("range", this.kind),
-        element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high),
+        element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high, this.unit),
         element("div", { class: "checks" }, element("label", {}, this.symmetric, "about 0"), element("label", {}, this.logarithmic, "logarithmic"))),
       row("edges", this.edges),
       element("button", { type: "button", class: "small", title: "Colour every view like this one", onclick: () => this.spread() }, "Use for all views"), this.quality);
@@ -117,6 +118,7 @@ export class LookPanel {
     // One that the library adds to a view is not among those of the solver.
     const names = [...new Set([...fields.map(({ name }) => name), ...(look.field === null ? [] : [look.field])])];
     fill(this.field, [...names.map((name): [string, string] => [name, FIELD_TITLES[name] ?? words(name)]), ["", "none"]]);
+    write(this.unit, fields.find(({ name }) => name === look.field)?.unit ?? "");
     this.field.value = look.field ?? "";
     const count = fields.find((field) => field.name === look.field)?.components ?? 1;
     fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): [string, string] => [String(i), name])] : []);

@@ -5,7 +5,7 @@ import { part, write } from "../dom";
 import { digits, seconds } from "../number";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { runState, slowLink, whyNotSteering } from "../store/run";
+import { runState, slowLink, titleOf, whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
@@ -55,7 +55,7 @@ export class StatusBar {
 
     const role = part("role");
     role.dataset.role = hello?.role ?? "";
-    write(role, !hello || end ? "" : hello.role === "driver" ? "you steer" : hello.may_drive === false || (status?.driver ?? null) === null ? "watching" : `watching · viewer ${status?.driver} steers`);
+    write(role, !hello || end ? "" : hello.role === "driver" ? "you steer" : hello.may_drive === false || (status?.driver ?? null) === null ? "watching" : `watching · ${titleOf(state, String(status?.driver))} steers`);
 
     const pause = part("pause") as HTMLButtonElement;
     const why = whyNotSteering(state);
@@ -68,7 +68,9 @@ export class StatusBar {
     write(part("cycle"), String(status.cycle));
     write(part("time"), digits(status.time, 5));
     write(part("step"), seconds(status.step_seconds));
-    write(part("viewers"), status.viewers === undefined ? "–" : String(status.viewers));
+    const viewers = status.viewers === undefined ? "–" : String(status.viewers);
+    write(part("viewers"), viewers);
+    part("viewers").setAttribute("aria-label", `viewers ${viewers}: people and links`);
     const quality = status.quality;
     const shown = part("quality");
     write(shown, quality ? digits(quality.min, 3) : "–");

@@ -65,6 +65,8 @@ export interface PictureTools {
   ruler(): void;
   /** Begins or leaves the choice of the two ends of a line. */
   line(): void;
+  /** Begins or leaves the choice of the place of a note. */
+  note(): void;
   save(): void;
   /** Begins a film, or ends it. */
   movie(): void;
@@ -84,6 +86,7 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   };
   part("ruler").addEventListener("click", () => tools.ruler());
   part("line").addEventListener("click", () => tools.line());
+  part("note").addEventListener("click", () => tools.note());
   part("movie").addEventListener("click", () => tools.movie());
   part("screenshot").addEventListener("click", () => tools.save());
   part("full-screen").addEventListener("click", fullScreen);
@@ -92,7 +95,7 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   const actions: Record<string, () => void> = {
     p: () => { if (pointer) tools.pin(pointer.x, pointer.y); },
     P: () => tools.unpin(),
-    m: () => tools.ruler(), l: () => tools.line(), s: () => tools.save(), f: fullScreen,
+    m: () => tools.ruler(), l: () => tools.line(), n: () => tools.note(), s: () => tools.save(), f: fullScreen,
   };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;

@@ -3,7 +3,7 @@ import type { ClientMessage } from "../connection/protocol";
 import { part, write } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { isSteering } from "../store/run";
+import { capital, isSteering, titleOf } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
@@ -21,9 +21,9 @@ export class WheelPanel {
     for (const kind of ["pointermove", "pointerdown", "wheel", "keydown"]) {
       window.addEventListener(kind, () => this.here(), { passive: true, capture: true });
     }
-    store.watch((state) => (isSteering(state) ? state.askedBy : null), (by) => {
+    store.watch((state) => (isSteering(state) && state.askedBy !== null ? capital(titleOf(state, state.askedBy)) : null), (by) => {
       part("asked").hidden = by === null;
-      if (by !== null) write(part("asked-text"), `Viewer ${by} asks to steer.`);
+      if (by !== null) write(part("asked-text"), `${by} asks to steer.`);
     });
     store.watch(mayAsk, (may) => { part("wheel").hidden = !may; });
   }

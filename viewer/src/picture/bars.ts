@@ -61,6 +61,9 @@ export class ScalarBars {
   }
 }
 
+/** A title with the unit of what it names, in brackets, where there is one. */
+export const withUnit = (title: string, unit: string | null): string => (unit ? `${title} [${unit}]` : title);
+
 /** A field and its component in words. */
 export function fieldText(field: string, components: number, component: number, title?: string): string {
   const suffix = components <= 1 ? "" : component < 0 ? " magnitude" : ` ${componentNames(components)[component] ?? ""}`;

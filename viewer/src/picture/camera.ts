@@ -40,6 +40,7 @@ export class Camera {
 
   set stand({ position, focalPoint, viewUp, parallel, parallelScale, viewAngle }: Stand) {
     this.isPlaced = true;
+    this.whole = null;
     const camera = this.renderer.getActiveCamera();
     camera.setPosition(...position);
     camera.setFocalPoint(...focalPoint);

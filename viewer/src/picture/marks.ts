@@ -1,9 +1,10 @@
-/** Marks over the picture that go with places of it: pinned probes, the ruler, the worst cells. */
+/** Marks over the picture that go with places of it: pinned probes, the ruler, the worst cells, notes. */
 import type { Vector } from "../connection/protocol";
 
 /** A mark: a point, or a line through several, and what is written beside the last. */
-export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" }
+export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" | "note" }
 
+const RADII: Record<Mark["kind"], number> = { probe: 4, ruler: 4, cell: 9, note: 6 };
 const SVG = "http://www.w3.org/2000/svg";
 
 export class Marks {
@@ -34,7 +35,7 @@ export class Marks {
       const places = points.map((point) => this.place(point)).map(([x, y]): [number, number] => [x - box.left, y - box.top]);
       if (places.some((at) => !at.every(Number.isFinite))) continue;
       if (places.length > 1) make("polyline", { class: kind, points: places.map((at) => at.join(",")).join(" ") });
-      for (const [x, y] of places) make("circle", { class: kind, cx: x, cy: y, r: kind === "cell" ? 9 : 4 });
+      for (const [x, y] of places) make("circle", { class: kind, cx: x, cy: y, r: RADII[kind] });
       const last = places.at(-1);
       if (last && label !== "") make("text", { class: kind, x: last[0] + 12, y: last[1] + 4 }, label);
     }

@@ -1,5 +1,5 @@
-/** The picture as a film, for as long as somebody lets it run. */
-import { download } from "../dom";
+/** The picture as a film, with its scalar bars, for as long as somebody lets it run. */
+import { download, element } from "../dom";
 
 /** Pictures a second, and bits a second. */
 const RATE = 30, BITS = 8_000_000;
@@ -8,21 +8,43 @@ const MOST = 500_000_000;
 /** Formats that browsers write, the best liked first. */
 const FORMATS = ["video/mp4;codecs=avc1.42E01F", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
 
+export interface MovieListener {
+  /** What the file is called, without its ending. */
+  name(): string;
+  /** Whether a film is being made. */
+  told(isRunning: boolean): void;
+  trouble(text: string): void;
+}
+
 export class Movie {
   private recorder: MediaRecorder | null = null;
+  private context: CanvasRenderingContext2D | null = null;
 
-  /** `told` hears whether one is being made. */
-  constructor(private readonly canvas: () => HTMLCanvasElement | null, private readonly name: () => string, private readonly told: (isRunning: boolean) => void, private readonly trouble: (text: string) => void) {}
+  /** `picture` is the canvas that is filmed, `paint` fills another one with it and what belongs to it. */
+  constructor(
+    private readonly picture: () => HTMLCanvasElement | null,
+    private readonly paint: (context: CanvasRenderingContext2D, picture: HTMLCanvasElement) => void, private readonly listener: MovieListener,
+  ) {}
 
   toggle(): void {
     if (this.recorder) this.recorder.stop();
     else this.start();
   }
 
+  /** A picture was drawn. To be called in the same task, after which the canvas may be empty. */
+  drawn(): void {
+    const picture = this.recorder && this.picture();
+    if (picture && this.context) this.paint(this.context, picture);
+  }
+
   private start(): void {
-    const canvas = this.canvas();
+    const picture = this.picture();
     const format = typeof MediaRecorder === "undefined" ? undefined : FORMATS.find((candidate) => MediaRecorder.isTypeSupported(candidate));
-    if (!canvas || format === undefined) return this.trouble("this browser cannot make films");
+    // A film has one size from its beginning to its end, of even numbers.
+    const even = (size: number): number => Math.max(2, 2 * Math.floor(size / 2));
+    const canvas = picture && element("canvas", { width: even(picture.width), height: even(picture.height) });
+    this.context = canvas?.getContext("2d") ?? null;
+    if (!canvas || !this.context || format === undefined) return this.listener.trouble("this browser cannot make films");
     const recorder = new MediaRecorder(canvas.captureStream(RATE), { mimeType: format, videoBitsPerSecond: BITS });
     const parts: Blob[] = [];
     let bytes = 0;
@@ -32,14 +54,14 @@ export class Movie {
       if (bytes > MOST && recorder.state === "recording") recorder.stop();
     });
     recorder.addEventListener("stop", () => {
-      this.recorder = null;
+      [this.recorder, this.context] = [null, null];
       for (const track of recorder.stream.getTracks()) track.stop();
-      this.told(false);
-      download(new Blob(parts, { type: format }), `${this.name()}.${format.startsWith("video/mp4") ? "mp4" : "webm"}`);
+      this.listener.told(false);
+      download(new Blob(parts, { type: format }), `${this.listener.name()}.${format.startsWith("video/mp4") ? "mp4" : "webm"}`);
     });
-    recorder.addEventListener("error", () => this.trouble("the film could not be made"));
+    recorder.addEventListener("error", () => this.listener.trouble("the film could not be made"));
     recorder.start(1000);
     this.recorder = recorder;
-    this.told(true);
+    this.listener.told(true);
   }
 }

@@ -13,10 +13,10 @@ export class Pins {
   private pins: Pin[] = [];
   private count = 0;
 
-  /** `text` names the field that a reading is of. */
+  /** `describe` names the field that a reading is of, and its unit. */
   constructor(
     private readonly history: History, private readonly marks: Marks, private readonly read: (probe: Probe) => ProbeReading | null,
-    private readonly text: (reading: ProbeReading) => string, private readonly chosen: (key: string) => void,
+    private readonly describe: (reading: ProbeReading) => { name: string; unit: string | null }, private readonly chosen: (key: string) => void,
   ) {}
 
   /** Pins a place, and has it plotted. The oldest goes where there are too many. */
@@ -39,10 +39,11 @@ export class Pins {
       const reading = this.read(pin.probe);
       if (!reading) return [];
       if (reading.field !== null) {
-        const name = this.text(reading);
+        const { name, unit } = this.describe(reading);
         // Of another field: another source, so that both may have the same cycles.
         const source = `${pin.name}, ${name}`;
         this.history.add(source, reading.cycle, reading.time, { [name]: reading.value });
+        this.history.setUnit(source, name, unit);
         taken = true;
         if (!pin.series.has(source)) {
           pin.series.add(source);

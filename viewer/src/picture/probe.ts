@@ -47,9 +47,9 @@ export function readProbe({ triangle, weights: at }: Probe, topology: TopologyFr
 }
 
 /** A reading in two lines: the value, and the place. */
-export function readingText({ field, value, point }: ProbeReading, title: string): string {
+export function readingText({ field, value, point }: ProbeReading, title: string, unit: string | null = null): string {
   // What rounding has left of a zero is a zero.
   const size = Math.max(...point.map(Math.abs));
   const place = `(${point.map((part) => digits(Math.abs(part) < 1e-6 * size ? 0 : part, 4)).join(", ")})`;
-  return field === null ? place : `${title} ${digits(value, 4)}\n${place}`;
+  return field === null ? place : `${title} ${digits(value, 4)}${unit ? ` ${unit}` : ""}\n${place}`;
 }

@@ -1,4 +1,4 @@
-/** The picture as a PNG, with the scalar bars beside it. */
+/** The picture with its scalar bars, and as a PNG. */
 import { download, element } from "../dom";
 import { colourMap } from "./colour";
 import { valueAt } from "./ranges";
@@ -10,13 +10,20 @@ export function withBars(picture: HTMLCanvasElement, bars: readonly Bar[], title
   const canvas = element("canvas", { width: picture.width, height: picture.height });
   const context = canvas.getContext("2d");
   if (!context) return picture;
-  context.drawImage(picture, 0, 0);
-  const unit = Math.max(1, picture.height / 800);
+  paint(context, picture, bars, title, ink);
+  return canvas;
+}
+
+/** Fills a canvas with a picture and its bars. */
+export function paint(context: CanvasRenderingContext2D, picture: HTMLCanvasElement, bars: readonly Bar[], title: (bar: Bar) => string, ink: string): void {
+  const { width: across, height: down } = context.canvas;
+  context.drawImage(picture, 0, 0, across, down);
+  const unit = Math.max(1, down / 800);
   context.font = `${12 * unit}px sans-serif`;
   context.fillStyle = ink;
   context.textBaseline = "middle";
   bars.forEach((bar, i) => {
-    const [left, top, width, height] = [picture.width - (110 + 130 * i) * unit, picture.height - 230 * unit, 14 * unit, 190 * unit];
+    const [left, top, width, height] = [across - (110 + 130 * i) * unit, down - 230 * unit, 14 * unit, 190 * unit];
     const { stops } = colourMap(bar.look.map);
     const gradient = context.createLinearGradient(0, top + height, 0, top);
     stops.forEach((stop, at) => gradient.addColorStop(at / (stops.length - 1), `rgb(${stop.map((part) => Math.round(255 * part)).join(" ")})`));
@@ -30,7 +37,6 @@ export function withBars(picture: HTMLCanvasElement, bars: readonly Bar[], title
       context.fillText(within(value, bar.look.range.logarithmic ? [0, value] : bar.range), left + width + 8 * unit, top + height * (1 - tick / 5));
     }
   });
-  return canvas;
 }
 
 /** Hands a canvas to the person as a file. */

@@ -1,6 +1,6 @@
 /** What can happen: from the simulation, or from the person at the page. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, Played, RunEnd, Status } from "../connection/protocol";
+import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { Look } from "./looks";
 import type { Part, PreviewState, Problem } from "./state";
@@ -19,6 +19,10 @@ export type Action =
   | { type: "played"; played: Played }
   | { type: "end"; end: RunEnd }
   | { type: "wheel asked"; by: string }
+  | { type: "people"; viewers: readonly Person[] }
+  | { type: "followed"; by: number }
+  | { type: "note pinned"; note: PinnedNote }
+  | { type: "note removed"; number: number }
   | { type: "refused"; id: string | null; text: string }
   | { type: "unreadable"; text: string }
   | { type: "schema"; form: OrderForm | null; settings: Values }
@@ -26,6 +30,7 @@ export type Action =
   | { type: "order sent"; id: string; order: Json; at: number }
   | { type: "order dismissed"; id: string }
   | { type: "wheel answered" }
+  | { type: "following"; on: boolean }
   // The views; `view` is null for all of them.
   | { type: "look"; view: string | null; look: Partial<Look> }
   | { type: "view chosen"; view: string }

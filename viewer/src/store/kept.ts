@@ -1,4 +1,4 @@
-/** What the page keeps over a reload: how views look, the dock, the theme, whether the tour was seen. Nothing of the run, and no secret. */
+/** What the page keeps over a reload: how views look, the dock, the theme, whether the tour was seen, the person's name. Nothing of the run, and no secret. */
 import type { Theme } from "../picture/theme";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
@@ -6,11 +6,13 @@ import type { Looks } from "./looks";
 const KEY = "tombolo-page";
 /** Longer than anything that the page writes. */
 const LONGEST = 100_000;
+/** The most characters of a name. */
+export const LONGEST_NAME = 40;
 
 /** The dock: whether it is open, and which monitors are plotted; null for those of the beginning. */
 export interface DockState { open: boolean; chosen: readonly string[] | null }
 
-interface Content { looks: Looks; dock: DockState; theme: Theme | null; toured: boolean }
+interface Content { looks: Looks; dock: DockState; theme: Theme | null; toured: boolean; name: string }
 
 export class Kept {
   private readonly content: Content;
@@ -30,6 +32,10 @@ export class Kept {
   /** Whether the tour was seen or left. */
   get toured(): boolean { return this.content.toured; }
   set toured(toured: boolean) { this.keep("toured", toured); }
+
+  /** How the person at this browser is called; empty where nobody has said. */
+  get name(): string { return this.content.name; }
+  set name(name: string) { this.keep("name", name); }
 
   private keep<K extends keyof Content>(key: K, value: Content[K]): void {
     this.content[key] = value;
@@ -56,5 +62,6 @@ function read(storage: Pick<Storage, "getItem">): Content {
   return {
     looks: readLooks(found.looks), dock: { open: open !== false, chosen: names },
     theme: found.theme === "dark" || found.theme === "light" ? found.theme : null, toured: found.toured === true,
+    name: typeof found.name === "string" ? found.name.slice(0, LONGEST_NAME) : "",
   };
 }

@@ -18,6 +18,8 @@ const LONGEST_ERRORS = 50;
 /** Enough to know the time of a picture that is half a minute old, at ten words a second. */
 const LONGEST_PROGRESS = 300;
 const LONGEST_GAPS = 20;
+/** Without a connection nobody is known to be there. */
+const NOBODY: Pick<State, "people" | "followedBy" | "following"> = { people: [], followedBy: 0, following: false };
 
 export function reduce(state: State, action: Action): State {
   const before = wishedOrder(state);
@@ -31,7 +33,7 @@ function after(state: State, action: Action): State {
     case "connection": {
       const connected = action.state === "connected";
       return {
-        ...state, askedBy: connected ? state.askedBy : null, coarser: connected ? {} : state.coarser,
+        ...state, ...(connected ? {} : NOBODY), askedBy: connected ? state.askedBy : null, coarser: connected ? {} : state.coarser,
         connection: { ...state.connection, state: action.state, explanation: action.explanation, fresh: connected },
       };
     }
@@ -51,8 +53,13 @@ function after(state: State, action: Action): State {
     }
     case "order dismissed": return { ...state, orders: state.orders.map((order) => (order.id === action.id ? { ...order, dismissed: true } : order)) };
     case "played": return { ...state, played: action.played };
-    case "end": return { ...state, end: action.end, askedBy: null };
+    case "end": return { ...state, ...NOBODY, end: action.end, askedBy: null };
     case "wheel asked": return { ...state, askedBy: action.by };
+    case "people": return { ...state, people: action.viewers };
+    case "followed": return { ...state, followedBy: action.by };
+    case "following": return { ...state, following: action.on };
+    case "note pinned": return { ...state, notes: [...state.notes.filter(({ number }) => number !== action.note.number), action.note] };
+    case "note removed": return { ...state, notes: state.notes.filter(({ number }) => number !== action.number) };
     case "wheel answered": return { ...state, askedBy: null };
     case "refused": {
       const orders = orderRefused(state.orders, action.id, action.text);
@@ -116,6 +123,9 @@ function withHello(state: State, hello: Hello): State {
     selection: { parts: sameJson(parts, state.selection.parts) ? state.selection.parts : parts, hovered: hovered !== null && names.has(hovered) ? hovered : null },
     orders: ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
     askedBy: hello.role === "driver" ? state.askedBy : null,
+    following: hello.role !== "driver" && state.following,
+    followedBy: hello.role === "driver" ? state.followedBy : 0,
+    notes: hello.notes ?? state.notes,
     // Whoever has the wheel now need not know that it was refused before.
     refusal: hello.role !== state.hello?.role ? "" : state.refusal,
   };

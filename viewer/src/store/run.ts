@@ -30,6 +30,19 @@ export function slowLink(state: State, now: number): string {
   return `The link is slow: the picture is ${Math.round(age / 1000)} s old, ${behind} cycles behind${lost}.`;
 }
 
+/** A viewer in words: by the name that it has given itself, which another may have too, and by that which is its own. */
+export function titleOf({ people }: Pick<State, "people">, client: string): string {
+  const name = people.find((person) => person.client === client)?.name;
+  return name ? `${name} (${client})` : `viewer ${client}`;
+}
+
+/** A text with a capital letter at its beginning. */
+export const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Whether this viewer could steer, so that it may write notes and give links for steering. */
+export const mayDrive = ({ connection, hello, end }: State): boolean =>
+  end === null && connection.state === "connected" && hello !== null && hello.may_drive !== false && !hello.recording;
+
 /** Whether this viewer's commands are obeyed. */
 export const isSteering = (state: State): boolean => whyNotSteering(state) === "";
 
@@ -42,5 +55,6 @@ export function whyNotSteering(state: State): string {
   if (status?.stopped) return "The run is coming to its end.";
   if (hello.role === "driver") return "";
   if (hello.may_drive === false) return "This link is for watching only.";
-  return status?.driver === null || status?.driver === undefined ? "Nobody steers: ask to steer first." : `Viewer ${status.driver} steers: ask to steer first.`;
+  const { driver } = status ?? {};
+  return driver === null || driver === undefined ? "Nobody steers: ask to steer first." : `${capital(titleOf(state, String(driver)))} steers: ask to steer first.`;
 }

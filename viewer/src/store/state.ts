@@ -1,6 +1,6 @@
 /** What the page knows: of the run, of what is being composed, and of what became of it. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, Played, RunEnd, Status } from "../connection/protocol";
+import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { Looks } from "./looks";
 
@@ -93,6 +93,14 @@ export interface State {
   forecast: ForecastState;
   /** The viewer that asks for the wheel. */
   askedBy: string | null;
+  /** Who is connected, this viewer among them; none where nobody has said. */
+  people: readonly Person[];
+  /** How many follow the camera of this viewer, which steers. */
+  followedBy: number;
+  /** Whether this picture is seen from where that of the one who steers is. */
+  following: boolean;
+  /** The notes that are pinned, the oldest first. */
+  notes: readonly PinnedNote[];
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
   /** What went wrong on the way here: frames or messages that could not be read, newest last. */
@@ -113,5 +121,5 @@ export const INITIAL: State = {
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
   orders: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
-  askedBy: null, refusal: "", errors: [],
+  askedBy: null, people: [], followedBy: 0, following: false, notes: [], refusal: "", errors: [],
 };

@@ -1,6 +1,7 @@
 //! The tasks that reach a run: they watch and steer it through its link.
 
 mod doctor;
+mod link;
 mod order;
 mod queue;
 mod status;
@@ -18,9 +19,9 @@ use crate::program::{Failure, say};
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
 
 /// The names of these tasks, which have exit codes of their own.
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 14] = [
     "status", "watch", "order", "forecast", "undo", "queue", "replace", "pause", "resume", "stop",
-    "set", "cancel", "doctor",
+    "set", "cancel", "link", "doctor",
 ];
 
 /// How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
@@ -77,6 +78,9 @@ pub(crate) enum Task {
     /// Take an order back that has not begun to move the mesh
     #[command(after_help = EXIT_CODES)]
     Cancel(steer::CancelOptions),
+    /// Print a link for somebody else: it opens one browser, once
+    #[command(after_help = EXIT_CODES)]
+    Link(link::Options),
     /// Say why a connection does not work, and what to do about it
     #[command(after_help = EXIT_CODES)]
     Doctor(Target),
@@ -101,6 +105,7 @@ pub(crate) fn run(task: &Task) -> Result<(), Failure> {
         Task::Stop(target) => (steer::stop(target), target.json),
         Task::Set(options) => (steer::set(options), options.target.json),
         Task::Cancel(options) => (steer::cancel(options), options.target.json),
+        Task::Link(options) => (link::link(options), options.target.json),
         Task::Doctor(target) => (doctor::doctor(target), target.json),
     };
     if let (Err(Failure::Wrong(message) | Failure::NoConnection(message)), true) = (&done, as_json)

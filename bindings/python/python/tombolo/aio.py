@@ -91,6 +91,10 @@ class AsyncRun:
         """As `Run.forecast`."""
         return await asyncio.to_thread(lambda: self.run.forecast(edits, timeout=timeout, **settings))
 
+    async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
+        """As `Run.link_for`."""
+        return await asyncio.to_thread(lambda: self.run.link_for(rights, timeout))
+
     async def _give(self, give: Callable[[], Command], timeout: Optional[float]) -> Command:
         command = await asyncio.to_thread(give)
         return await _in_slices(command.wait, timeout)

@@ -50,9 +50,9 @@ class Event(NamedTuple):
     Attributes
     ----------
     kind : str
-        `hello`, `status`, `order`, `monitor`, `forecast`, `pipelines`, `done`, `error`, `frame`, `lost` (the connection
-        was lost, and is made again), `ended` (nothing comes behind it) or the name of a message that this version does
-        not know.
+        `hello`, `status`, `order`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
+        `note_removed`, `error`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes
+        behind it) or the name of a message that this version does not know.
     data : dict, View or str
         The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
     """
@@ -673,6 +673,30 @@ class Run:
         return command.wait(timeout) if wait else command
 
     # ---- Elsewhere.
+
+    def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
+        """Make a link for somebody else. It opens one browser, once.
+
+        Parameters
+        ----------
+        rights : {"watch", "drive"}
+            Whether that browser only watches, or may be the one that steers. The second is given only to a client that
+            may steer itself.
+        timeout : float
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        str
+            The address: that of this run's own link, with a key in place of its token.
+
+        Raises
+        ------
+        RejectedError
+            This client may not give such a link.
+        """
+        self._check()
+        return in_thread(lambda: self._client.link_for(rights, timeout))
 
     @property
     def aio(self) -> AsyncRun:

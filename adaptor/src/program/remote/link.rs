@@ -1,0 +1,38 @@
+//! `tombolo link`.
+
+use crate::pipelines::language::LinkFor;
+use clap::{Args, ValueEnum};
+use serde_json::json;
+
+use super::{ANSWER, Target, connect, failed};
+use crate::program::{Failure, say};
+
+#[derive(Debug, Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
+    pub(super) target: Target,
+    /// The rights of the browser that it opens
+    #[arg(long = "for", value_enum, default_value = "watch")]
+    rights: Rights,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Rights {
+    /// It sees everything and changes nothing
+    Watch,
+    /// It may be the one that drives
+    Drive,
+}
+
+pub(crate) fn link(options: &Options) -> Result<(), Failure> {
+    let (rights, watches) = match options.rights {
+        Rights::Watch => (LinkFor::Watch, true),
+        Rights::Drive => (LinkFor::Drive, false),
+    };
+    let client = connect(&options.target, watches)?;
+    let address = client.link_for(rights, ANSWER).map_err(failed)?;
+    if options.target.json {
+        return say(json!({"link": {"for": rights, "address": address}}));
+    }
+    say(address)
+}
