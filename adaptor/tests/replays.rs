@@ -211,9 +211,15 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     viewer.send(&order("better", 0.05, Some("second")));
     viewer.send(&order("late", 0.3, Some("first")));
     viewer.send(&order("lost", 0.3, Some("nobody")));
+    // The mesh is not moved on before they are there.
+    for id in ["better", "late", "lost"] {
+        viewer.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
+    }
     let is_over = |order: &Value| order["status"] == "applied" || order["status"] == "rejected";
     let mut ended = std::collections::BTreeMap::new();
-    while ended.len() < 6 {
+    // A pipeline gives orders too.
+    let all = ["first", "second", "third", "better", "late", "lost"];
+    while !all.iter().all(|id| ended.contains_key(*id)) {
         step(&mut solver, &mut trace);
         let wait = std::time::Duration::from_millis(1);
         while let Some(order) = viewer.look_for("order", wait, is_over) {

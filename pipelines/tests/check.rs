@@ -56,7 +56,7 @@ fn errors_of_all_places_are_told_in_the_order_of_the_file() {
         &told(text),
         r#"
 views.json:2:14: version: found "1", expected a whole number from 0 to 4294967295
-views.json:3:3: steam: found the unknown key `steam`, expected `version`, `description`, `stream`, `journal`, `record`, `record_megabytes`, `steering`, `watch` or `pipelines`; did you mean `stream`?
+views.json:3:3: steam: found the unknown key `steam`, expected `version`, `description`, `stream`, `journal`, `record`, `record_megabytes`, `steering`, `watch`, `units` or `pipelines`; did you mean `stream`?
 views.json:3:23: steam.listen: found "nowhere", expected ADDRESS:PORT, such as 127.0.0.1:7070, or unix:/PATH
 views.json:5:38: pipelines[0].every.steps: found 0, expected a whole number from 1 to 18446744073709551615
 views.json:6:28: pipelines[0].stages[0].slice.origin: found 2 values, expected an array of 3 values
@@ -184,7 +184,7 @@ orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resu
 {"id":"c","stat"#,
         ),
         r#"
-orders.json:1:70: order.gard: found the unknown key `gard`, expected `edits`, `stack`, `undo`, `schedule`, `deform` or `guard`; did you mean `guard`?
+orders.json:1:70: order.gard: found the unknown key `gard`, expected `edits`, `stack`, `undo`, `schedule`, `deform`, `guard` or `replaces`; did you mean `guard`?
 orders.json:1:90: order.gard.otherwise: found the unknown name `pray`, expected `reject`, `untangle` or `clamp`
 orders.json:2:20: status: found the unknown name `acepted`, expected `accepted`, `applied`, `rejected`, `not_followed` or `not_confirmed`; did you mean `accepted`?
 orders.json:2:38: cycle: found "4", expected a whole number from 0 to 18446744073709551615
