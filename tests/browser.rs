@@ -34,11 +34,6 @@ fn drive(script: &str, run: &mut Run) {
     );
 }
 
-/// The nozzle of the demo, running.
-fn nozzle() -> Run {
-    running("nozzle", "channel-60k")
-}
-
 /// A case of the demos, running, its mesh made where it is not there.
 fn running(case: &str, mesh: &str) -> Run {
     if !project().join(format!("meshes/{mesh}.msh")).exists() {
@@ -54,52 +49,42 @@ fn running(case: &str, mesh: &str) -> Run {
     Run::flow(&["--case", &case, "--listen", "127.0.0.1:0"])
 }
 
+/// Runs a script on a case of the demos, which goes on behind it.
+fn watch(script: &str, case: &str, mesh: &str) {
+    let _alone = alone();
+    let mut run = running(case, mesh);
+    drive(script, &mut run);
+    assert!(run.is_running(), "the run ended:\n{}", run.text());
+}
+
 #[test]
 fn the_demo_in_a_browser() {
-    let _alone = alone();
-    let mut run = nozzle();
-    drive("demo.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("demo.mjs", "nozzle", "channel-60k");
 }
 
 #[test]
 fn seeing_in_a_browser() {
-    let _alone = alone();
-    let mut run = nozzle();
-    drive("seeing.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("seeing.mjs", "nozzle", "channel-60k");
 }
 
 #[test]
 fn several_people_in_a_browser() {
-    let _alone = alone();
-    let mut run = nozzle();
-    drive("together.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("together.mjs", "nozzle", "channel-60k");
 }
 
 #[test]
 fn before_and_after_in_a_browser() {
-    let _alone = alone();
-    let mut run = nozzle();
-    drive("comparing.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("comparing.mjs", "nozzle", "channel-60k");
 }
 
 #[test]
 fn shaping_by_hand_in_a_browser() {
-    let _alone = alone();
-    let mut run = nozzle();
-    drive("handles.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("handles.mjs", "nozzle", "channel-60k");
 }
 
 #[test]
 fn a_first_day_in_a_browser() {
-    let _alone = alone();
-    let mut run = running("bypass", "bypass-0");
-    drive("tasks.mjs", &mut run);
-    assert!(run.is_running(), "the run ended:\n{}", run.text());
+    watch("tasks.mjs", "bypass", "bypass-0");
 }
 
 /// A small nozzle that is streamed, with these options besides.

@@ -1,23 +1,13 @@
 //! `flow` killed anywhere and restarted ends as if nothing had happened, to the bit.
 
+#[path = "../adaptor/tests/common/random.rs"]
+mod random;
+
 use std::time::Duration;
 
+use random::Random;
 use serde_json::{Value, json};
 use tombolo_tests::{PATIENCE, Run, Small};
-
-/// Numbers that look random; the same for the same seed.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        // Steele, Lea and Flood: SplitMix64.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)) % count
-    }
-}
 
 fn pinch(factor: f64, steps: u32, every: u32) -> Value {
     json!({"edits": [{"scale_direction": {

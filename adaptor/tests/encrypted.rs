@@ -11,20 +11,17 @@ use std::{
         net::UnixStream,
     },
     path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
-use common::{Solver, config, squeeze};
+use common::{
+    Solver, config,
+    running::{self, Running, connect},
+};
 use serde_json::{Value, json};
 use tombolo::{
-    Adaptor, OrderStatus, Settings,
-    client::{Client, ClientError, Event, Link},
-    pipelines::language::parse_valid,
+    Adaptor, Settings,
+    client::{ClientError, Link},
 };
 
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -37,58 +34,20 @@ fn settings(stream: Value) -> Settings {
 /// A run that goes on by itself.
 struct Run {
     link: Link,
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    _running: Running,
 }
 
 impl Run {
     fn new(stream: Value) -> Self {
-        let mut solver = Solver::new(settings(stream));
+        let solver = Solver::new(settings(stream));
         let link = solver.adaptor.link().expect("a server").parse().expect("a link");
-        let over = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&over);
-        let run = move || {
-            while !is_over.load(Ordering::Relaxed) {
-                solver.step();
-                std::thread::sleep(Duration::from_millis(2));
-            }
-            solver.finish();
-        };
-        Self { link, over, thread: Some(std::thread::spawn(run)) }
+        Self { link, _running: Running::start(solver) }
     }
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn connect(link: &Link) -> Result<Client, ClientError> {
-    Client::connect(link, &tombolo::client::Options::default())
 }
 
 /// Steers a run through its link, and reads what it serves beside its WebSocket.
 fn steer(link: &Link) {
-    let client = connect(link).expect("connected");
-    client.drive(PATIENCE).expect("nobody else drives");
-    let order = parse_valid(&squeeze(0.2).to_string(), "order").expect("an order");
-    let id = client.order(&order).expect("sent");
-    loop {
-        let told = client.next(PATIENCE).expect("connected").expect("something is said");
-        match told.event {
-            Event::Order(order) if order.id == id => match order.status {
-                OrderStatus::Applied => break,
-                OrderStatus::Rejected => panic!("{:?}", order.reason),
-                _ => {}
-            },
-            _ => {}
-        }
-    }
-    assert_eq!(client.stack().expect("an answer").len(), 1);
+    let client = running::steer(link);
     assert_eq!(client.pipelines().expect("an answer"), json!([]));
 }
 

@@ -8,21 +8,19 @@ use std::{
     net::{SocketAddr, TcpStream},
     path::Path,
     process::{Child, Command, Stdio},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
-use common::{Solver, config, squeeze};
+use common::{
+    Solver, config,
+    running::{self, Running, connect},
+};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tombolo::{
-    OrderStatus, Settings,
+    Settings,
     client::{Client, ClientError, Event, Link, Options},
-    pipelines::language::{Tls, parse_valid},
+    pipelines::language::Tls,
     stream::relay::{Relay, RelaySettings},
 };
 
@@ -136,9 +134,7 @@ fn request(relay: SocketAddr, method: &str, path: &str, headers: &[(&str, &str)]
 struct Run {
     link: Link,
     browser_link: String,
-    over: Arc<AtomicBool>,
-    cycle: Arc<AtomicU64>,
-    thread: Option<JoinHandle<()>>,
+    running: Running,
 }
 
 impl Run {
@@ -148,61 +144,22 @@ impl Run {
         let text = json!({"version": 1, "stream": stream, "pipelines": [
             {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}]});
         let settings = Settings { config: config(&text.to_string()), ..Settings::default() };
-        let mut solver = Solver::of_box([6, 6, 6], settings);
+        let solver = Solver::of_box([6, 6, 6], settings);
         until("the run at its relay", ready);
         let link = solver.adaptor.link().expect("a server").parse().expect("a link");
         let browser_link = solver.adaptor.browser_link().expect("a link");
-        let (over, cycle) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
-        let (is_over, at) = (Arc::clone(&over), Arc::clone(&cycle));
-        let run = move || {
-            while !is_over.load(Ordering::Relaxed) {
-                solver.step();
-                at.store(solver.cycle, Ordering::Relaxed);
-                std::thread::sleep(Duration::from_millis(2));
-            }
-            solver.finish();
-        };
-        let thread = Some(std::thread::spawn(run));
-        Self { link, browser_link, over, cycle, thread }
+        Self { link, browser_link, running: Running::start(solver) }
     }
 
     fn goes_on(&self) {
-        let before = self.cycle.load(Ordering::Relaxed);
-        until("a step", || self.cycle.load(Ordering::Relaxed) > before + 3);
+        let before = self.running.cycle();
+        until("a step", || self.running.cycle() > before + 3);
     }
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
-    }
-}
-
-fn connect(link: &Link) -> Result<Client, ClientError> {
-    Client::connect(link, &Options::default())
 }
 
 /// Steers a run through its link, and reads what it serves beside its WebSocket.
 fn steer(link: &Link) {
-    let client = connect(link).expect("connected");
-    client.drive(PATIENCE).expect("nobody else drives");
-    let order = parse_valid(&squeeze(0.2).to_string(), "order").expect("an order");
-    let id = client.order(&order).expect("sent");
-    loop {
-        let received = client.next(PATIENCE).expect("connected").expect("something is said");
-        match received.event {
-            Event::Order(order) if order.id == id => match order.status {
-                OrderStatus::Applied => break,
-                OrderStatus::Rejected => panic!("{:?}", order.reason),
-                _ => {}
-            },
-            _ => {}
-        }
-    }
-    assert_eq!(client.stack().expect("an answer").len(), 1);
+    let client = running::steer(link);
     let vertices = client.surface().expect("a surface").vertices().len();
     assert!(vertices > 0);
 }
@@ -288,7 +245,7 @@ fn a_browser_has_a_cookie_of_each_run_and_none_sees_that_of_the_relay() {
     assert!(of_relay.starts_with(&format!("tombolo-relay-{port}=")), "{of_relay}");
     assert!(of_runs.iter().all(|text| text.starts_with(&format!("tombolo-{port}="))));
     let status = |path: &str, cookie: &str| here.get(path, &[("Cookie", cookie)]).status;
-    // What a browser sends: the cookie of the run, and that of the relay, which leads to all.
+    // A browser sends the cookie of the run, and that of the relay, which leads to all.
     for (run, cookie) in ["nozzle", "wing"].into_iter().zip(&of_runs) {
         assert_eq!(status(&format!("/{run}/stack"), &format!("{of_relay}; {cookie}")), 200);
         assert_eq!(status("/-/runs", &format!("{cookie}; {of_relay}")), 200);
@@ -421,7 +378,7 @@ fn a_relay_that_is_killed_and_comes_back_is_found_again() {
     let (_relay, _) = Program::start(directory.path(), &place);
     until("the run", || names(address, &secret) == ["nozzle"]);
     steer(&run.link);
-    let now = run.cycle.load(Ordering::Relaxed);
+    let now = run.running.cycle();
     until("the client", || {
         watching.next(Duration::from_millis(50)).expect("not given up");
         watching.status().is_some_and(|status| status.cycle > now)

@@ -4,23 +4,9 @@ mod common;
 
 use std::path::Path;
 
-use common::{Solver, Viewer, bits, config, squeeze};
+use common::{Solver, Viewer, bits, config, random::Random, squeeze};
 use serde_json::{Value, json};
 use tombolo::{OrderStatus, Settings, pipelines::language::parse_journal};
-
-/// Numbers that look random; the same for the same seed.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        // Steele, Lea and Flood: SplitMix64.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)) % count
-    }
-}
 
 /// A pipeline gives orders too, and viewers look on.
 const CONFIGURATION: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": [

@@ -4,7 +4,7 @@ mod common;
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use common::{Solver, Viewer, bits, config, squeeze};
+use common::{Solver, Viewer, bits, config, random::Random, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Channel, Checkpoint, OrderStatus, Settings, Step,
@@ -12,20 +12,6 @@ use tombolo::{
     deform::{distributed::Part, mesh::Mesh, shapes::box_of_tets},
     pipelines::language::{parse_journal, parse_orders},
 };
-
-/// Numbers that look random; the same for the same seed.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        // Steele, Lea and Flood: SplitMix64.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (mixed ^ (mixed >> 31)) % count
-    }
-}
 
 /// Pipelines give orders: every so often, once, and when what they measure over time says so.
 const PIPELINES: &str = r#""pipelines": [
@@ -223,7 +209,7 @@ fn what_was_accepted_after_the_checkpoint_is_done_again() {
         assert_same(&resumed[..until], &trace, from, &format!("seed {seed}:\n{journal}"));
         done_again += until;
         let orders = again.finish().orders;
-        // What was refused before the end stays refused, and is in the report as the others are.
+        // An order that was refused before the end stays refused, and is in the report as the others are.
         let refused =
             |id: &String| journal.contains(&format!("{{\"id\":\"{id}\",\"status\":\"rejected\""));
         for id in &acknowledged {

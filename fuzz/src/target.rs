@@ -8,8 +8,8 @@ use tombolo::{
     pipelines::{
         encode::{DecodedFrame, Decoder, decode_surface},
         language::{
-            Command, Message, TimedCommand, check, check_orders, parse, parse_journal,
-            parse_message, parse_orders,
+            Command, LanguageError, LanguageErrors, Message, TimedCommand, check, check_orders,
+            parse, parse_journal, parse_message, parse_orders,
         },
     },
     recording::Recording,
@@ -176,32 +176,32 @@ fn returns<T: serde::Serialize + PartialEq>(
     Ok(())
 }
 
-fn orders(text: &str) -> Result<String, String> {
-    let read = parse_orders(text, "orders.json");
-    agreed(text, &read, &check_orders(text, "orders.json"))?;
+/// Reads a text by both readers of a kind of file, the one that stops at the first error and the one
+/// that finds them all.
+fn file<T: serde::Serialize + PartialEq>(
+    text: &str,
+    parse: impl Fn(&str) -> Result<T, LanguageError>,
+    check: impl Fn(&str) -> Result<T, LanguageErrors>,
+) -> Result<String, String> {
+    let read = parse(text);
+    agreed(text, &read, &check(text))?;
     match read {
-        Ok(commands) => {
-            returns(&commands, |text| {
-                parse_orders(text, "orders.json").map_err(|error| error.to_string())
-            })?;
-            Ok(format!("{} commands", commands.len()))
+        Ok(value) => {
+            returns(&value, |text| parse(text).map_err(|error| error.to_string()))?;
+            Ok("read".into())
         }
         Err(error) => Ok(error.to_string()),
     }
 }
 
+fn orders(text: &str) -> Result<String, String> {
+    let name = "orders.json";
+    file(text, |text| parse_orders(text, name), |text| check_orders(text, name))
+}
+
 fn pipelines(text: &str) -> Result<String, String> {
-    let read = parse(text, "pipelines.json");
-    agreed(text, &read, &check(text, "pipelines.json"))?;
-    match read {
-        Ok(config) => {
-            returns(&config, |text| {
-                parse(text, "pipelines.json").map_err(|error| error.to_string())
-            })?;
-            Ok("a configuration".into())
-        }
-        Err(error) => Ok(error.to_string()),
-    }
+    let name = "pipelines.json";
+    file(text, |text| parse(text, name), |text| check(text, name))
 }
 
 fn message(text: &str) -> Result<String, String> {

@@ -65,7 +65,7 @@ pub(super) struct Connect {
 }
 
 struct State {
-    /// What the relay said last; before it does, what it can be expected to say.
+    /// The name and address by the relay's last answer; before the first, those that are expected.
     attached: Attached,
     is_connected: bool,
     /// Somebody has waited for it, in vain.

@@ -20,7 +20,7 @@ use crate::lock::lock;
 const DRIVING_VARIABLE: &str = "TOMBOLO_DRIVING_SECRET";
 const WATCHING_VARIABLE: &str = "TOMBOLO_WATCHING_SECRET";
 const RELAY_VARIABLE: &str = "TOMBOLO_RELAY_SECRET";
-/// What the names of a run's cookies begin with.
+/// The beginning of the names of a run's cookies.
 const COOKIE: &str = "tombolo";
 const EXPECTED: &str = "expected a secret of 16 to 128 letters, digits, '-' or '_'";
 /// Keys of each access that may wait to be used, and of those that one viewer has asked for; older

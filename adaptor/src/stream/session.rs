@@ -192,7 +192,7 @@ fn receive(
             ("this viewer watches: the secret or link that it came with is for watching", WATCHED)
         }
     };
-    // What can be neither a `drive` nor a note is not worth reading from one that watches.
+    // A viewer that watches can send a `drive` or a note; a longer message is not worth reading.
     if !drives && text.len() > most {
         return Err((None, watches.into()));
     }

@@ -128,7 +128,7 @@ fn switch_to_websocket(headers: &mut HeaderMap) {
 }
 
 fn without_those_of_connection(headers: &mut HeaderMap) {
-    // What `Connection` names belongs to it too.
+    // The headers that `Connection` names belong to it too.
     let named: Vec<HeaderName> = headers
         .get_all(header::CONNECTION)
         .iter()
