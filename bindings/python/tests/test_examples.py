@@ -77,6 +77,30 @@ def test_a_flow_around_a_cylinder_with_ngsolve(tmp_path):
     assert not np.array_equal(points[0], points[29])
 
 
+def test_a_loaded_bar_with_ngsolve(tmp_path):
+    pytest.importorskip("ngsolve")
+    elasticity = load("ngsolve/elasticity.py")
+    lengthened, points = {}, {}
+
+    def seen(cycle, bar, at):
+        lengthened[cycle] = bar.at_end()[0]
+        points[cycle] = at.copy()
+
+    longer = {"translate": {"features": ["end"], "fixed": ["clamp"], "by": [0.5, 0, 0]}}
+    orders = commands(longer, {"steps": 3, "every": {"steps": 2}}, 60, 130)
+    # Without contraction across it, a bar that is pulled has the same stress everywhere.
+    bar = {"size": 0.3, "poisson": 0.0, "load": (1e-3, 0, 0), "damping": 1.5}
+    report = elasticity.run(200, orders=orders, seen=seen, output=tmp_path, **bar)
+
+    assert [order["status"] for order in report["orders"]] == ["applied", "applied"], report["orders"]
+    # Hooke's law: load times length over Young's modulus, whatever the section.
+    assert points[129][:, 0].max() == pytest.approx(2.5, abs=1e-12)
+    assert lengthened[59] == pytest.approx(2e-3, rel=1e-3)
+    assert lengthened[129] == pytest.approx(2.5e-3, rel=1e-3)
+    assert lengthened[199] == pytest.approx(2e-3, rel=1e-3)
+    assert np.array_equal(points[0], points[199])
+
+
 def test_a_study_on_a_running_flow_finds_what_one_with_restarts_finds(small_nozzle):
     pytest.importorskip("scipy")
     throat = load("study/throat.py")
