@@ -1,6 +1,6 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
-//! shaping by hand, a first day, a shape changed by two people, several people together, and the end of
-//! a run.
+//! shaping by hand, a first day, pipelines changed, a shape changed by two people, several people together,
+//! and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -65,6 +65,11 @@ fn the_demo_in_a_browser() {
 #[test]
 fn seeing_in_a_browser() {
     watch("seeing.mjs", "nozzle", "channel-60k");
+}
+
+#[test]
+fn pipelines_changed_in_a_browser() {
+    watch("pipelines.mjs", "nozzle", "channel-60k");
 }
 
 #[test]

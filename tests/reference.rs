@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::fmt::Write as _;
 
 use serde_json::Value;
-use tombolo_pipelines::language::{TimedCommand, config_schema, order_schema};
+use tombolo_pipelines::language::{TimedCommand, config_schema, order_schema, pipeline_schema};
 use tombolo_pipelines::limits;
 use tombolo_tests::project;
 
@@ -45,19 +45,22 @@ fn the_reference_is_what_the_types_say() {
     );
 }
 
-/// The viewer's tests read the schema of an order as a server sends it.
+/// The viewer's tests read schemas as a server sends them.
 #[test]
-fn the_viewer_has_the_schema_of_an_order() {
-    let path = project().join("viewer/test/order-schema.json");
-    let schema =
-        serde_json::to_string_pretty(&order_schema()).expect("a schema can be written") + "\n";
-    if std::env::var_os("TOMBOLO_UPDATE").is_some() {
-        std::fs::write(&path, &schema).expect("the schema can be written");
+fn the_viewer_has_the_schemas_of_orders_and_pipelines() {
+    let schemas = [("order", order_schema()), ("pipeline", pipeline_schema())];
+    for (name, schema) in schemas {
+        let file = format!("viewer/test/{name}-schema.json");
+        let path = project().join(&file);
+        let schema = serde_json::to_string_pretty(&schema).expect("a schema can be written") + "\n";
+        if std::env::var_os("TOMBOLO_UPDATE").is_some() {
+            std::fs::write(&path, &schema).expect("the schema can be written");
+        }
+        assert!(
+            std::fs::read_to_string(&path).unwrap_or_default() == schema,
+            "{file} is out of date; write it anew: TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference"
+        );
     }
-    assert!(
-        std::fs::read_to_string(&path).unwrap_or_default() == schema,
-        "viewer/test/order-schema.json is out of date; write it anew: TOMBOLO_UPDATE=1 cargo test -p tombolo-tests --test reference"
-    );
 }
 
 #[derive(Default)]

@@ -35,6 +35,8 @@ export interface Inspection {
   readonly status: Status | null;
   readonly quality: QualitySummary | null;
   readonly stack: readonly unknown[];
+  /** The pipelines of the run, as JSON. */
+  readonly pipelines: readonly unknown[];
   /** Who is connected. */
   readonly people: readonly Person[];
   /** The notes that are pinned. */

@@ -26,6 +26,8 @@ import { FilesPanel } from "./panels/files";
 import { NotesPanel } from "./panels/notes";
 import { PeoplePanel } from "./panels/people";
 import { MonitorPanel } from "./panels/monitors";
+import { PipelineEditorPanel } from "./panels/pipeline-editor";
+import { PipelinesPanel } from "./panels/pipelines";
 import { ParameterPanel } from "./panels/parameters";
 import { RecordingPanel } from "./panels/recording";
 import { StatusBar } from "./panels/status";
@@ -53,6 +55,8 @@ import { Ruler } from "./picture/ruler";
 import { paint, save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
 import type { Bar } from "./picture/scene";
+import { Checker } from "./pipelines/checker";
+import type { CheckWorker } from "./pipelines/checker";
 import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
@@ -62,6 +66,7 @@ import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
 import type { Look } from "./store/looks";
+import { NO_PIPELINES, readDrafts } from "./store/pipeline-drafts";
 import { LINE, withQuality } from "./store/pipelines";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
@@ -75,7 +80,16 @@ if (!document.createElement("canvas").getContext("webgl2")) {
 }
 
 const kept = new Kept(window.localStorage);
-const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks }, reduce);
+/** Pipelines that are being written are kept over a reload of this page, and no longer. */
+const DRAFTS = "tombolo-drafts";
+const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);
+store.watch((state) => state.pipelines.drafts, (drafts) => {
+  try {
+    sessionStorage.setItem(DRAFTS, JSON.stringify(drafts));
+  } catch {
+    // A browser that keeps nothing, or is full: the page works all the same.
+  }
+});
 const addresses = streamAddress(window.location.href);
 /** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
 const kernel = compileKernel();
@@ -273,6 +287,12 @@ watchPictureTools(part("scene"), part("stage"), {
 });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
+pipelines.onChange(() => store.dispatch({ type: "pipelines known", pipelines: pipelines.all }));
+new PipelinesPanel(store, commands, () => scene.bounds());
+new PipelineEditorPanel(store, commands, {
+  schema: () => loadJson(addresses.pipelineSchema), load: () => import("./pipelines/editor"),
+  checker: new Checker(() => new Worker(new URL("./pipelines/check.worker.ts", import.meta.url), { type: "module" }) as unknown as CheckWorker),
+}, reveal);
 const bar = new StatusBar(store, commands);
 new WheelPanel(store, commands);
 const people = new PeoplePanel(store, commands, kept, () => window.location.href);
@@ -311,7 +331,7 @@ function takeMessage(message: ServerMessage): void {
     // The hello that comes with it says what there is now.
     case "pipelines":
       if (message.body.status === "applied") pipelines.answered(message.body.id);
-      return;
+      return store.dispatch({ type: "pipelines told", change: message.body });
     // The status shows what it has changed.
     case "done": return;
     case "play": return store.dispatch({ type: "played", played: message.body });
@@ -329,6 +349,7 @@ function takeMessage(message: ServerMessage): void {
     case "error": {
       const { id, message: text } = message.body;
       if (pipelines.answered(id)) void pipelines.told(-2);
+      if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
     }
@@ -453,6 +474,7 @@ publish({
       inverted: answer?.quality?.inverted ?? null, fraction: answer?.fraction ?? null,
     };
   },
+  get pipelines() { return structuredClone(store.state.pipelines.known); },
   get people() { return structuredClone(store.state.people); },
   get notes() { return structuredClone(store.state.notes); },
   get following() { return store.state.following; },

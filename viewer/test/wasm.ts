@@ -1,4 +1,7 @@
-/** The kernel's module as `wasm/build.mjs` made it. */
+/** The modules as `wasm/build.mjs` made them. */
 import { readFileSync } from "node:fs";
 
-export const wasm = new WebAssembly.Module(readFileSync(new URL("../wasm/pkg/kernel.wasm", import.meta.url)));
+const compiled = (name: string): WebAssembly.Module => new WebAssembly.Module(readFileSync(new URL(`../wasm/pkg/${name}.wasm`, import.meta.url)));
+
+export const wasm = compiled("kernel");
+export const languageWasm = compiled("language");

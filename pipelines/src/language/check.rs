@@ -339,7 +339,12 @@ fn configuration(mender: &mut Mender<'_>, tree: &mut Node, trial: &mut Tried<'_>
     }
 }
 
-fn pipeline(mender: &mut Mender<'_>, node: &mut Node, unread: &mut Unread) -> Piece<Pipeline> {
+/// Reads a pipeline, each stage and action by itself.
+pub(super) fn pipeline(
+    mender: &mut Mender<'_>,
+    node: &mut Node,
+    unread: &mut Unread,
+) -> Piece<Pipeline> {
     let stages = take_list(node, "stages");
     let then = take_list(node, "then");
     let Piece { mut value, mut lacks } = mender.read::<Pipeline>(node);

@@ -60,6 +60,22 @@ pub fn record_megabytes() -> NonZeroU32 {
 }
 
 impl Config {
+    /// A configuration of pipelines alone.
+    pub(super) fn of_pipelines(pipelines: Vec<Pipeline>) -> Self {
+        Self {
+            version: 1,
+            description: None,
+            stream: None,
+            journal: None,
+            record: None,
+            record_megabytes: record_megabytes(),
+            steering: Steering::default(),
+            watch: false,
+            units: BTreeMap::new(),
+            pipelines,
+        }
+    }
+
     /// The name of the channel whose mesh orders change, where a pipeline that runs on orders
     /// names one.
     #[must_use]

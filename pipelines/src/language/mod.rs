@@ -5,7 +5,8 @@
 //! [`order_schema`], [`pipeline_schema`]) and the reference pages. [`parse`] reads a configuration,
 //! [`parse_orders`] a file of orders or a journal, [`parse_json`] any other type with the same
 //! errors. [`check`] and [`check_orders`] read the same and tell every error at once;
-//! [`check_content`] finds out which of both a text is.
+//! [`check_content`] finds out which of both a text is; [`check_pipeline`] reads a pipeline that is
+//! to be set in a run.
 //!
 //! ```
 //! let failure = tombolo_pipelines::language::parse(
@@ -23,6 +24,7 @@
 
 mod cameras;
 mod check;
+mod check_pipeline;
 mod configuration;
 mod derived;
 mod error;
@@ -60,6 +62,7 @@ mod validate_orders;
 
 pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};
+pub use check_pipeline::{Beside, check_pipeline};
 pub use configuration::{
     Config, Listen, Steering, StreamLimits, StreamServer, Tls, record_megabytes,
 };

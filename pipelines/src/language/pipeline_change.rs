@@ -184,7 +184,7 @@ impl Validate for PipelineChange {
 }
 
 /// Refuses to change the channel whose shape is measured from its first mesh.
-fn check_steered(before: &Config, after: &Config) -> Result<(), Problem> {
+pub(super) fn check_steered(before: &Config, after: &Config) -> Result<(), Problem> {
     let (was, is) = (before.steered_channel(), after.steered_channel());
     if was == is {
         return Ok(());
@@ -204,7 +204,8 @@ fn check_steered(before: &Config, after: &Config) -> Result<(), Problem> {
     })
 }
 
-fn check_files(pipeline: &Pipeline) -> Result<(), Problem> {
+/// Refuses a pipeline that names a file which one that comes over the network may not name.
+pub(super) fn check_files(pipeline: &Pipeline) -> Result<(), Problem> {
     for (index, stage) in pipeline.stages.iter().enumerate() {
         let written = match stage {
             Stage::Displacement(import) if import.file.is_some() => {

@@ -35,7 +35,7 @@ export function backOff(attempt: number, random: number): number {
 }
 
 /** The addresses of the page's own server. The browser shows its cookie there, which no script can read. */
-export function streamAddress(page: string): { [name in "address" | "probe" | "surface" | "stack" | "schema" | "pipelines"]: string } {
+export function streamAddress(page: string): { [name in "address" | "probe" | "surface" | "stack" | "schema" | "pipelines" | "pipelineSchema"]: string } {
   const place = (name: string): URL => new URL(name, page);
   const stream = place("ws");
   const probe = stream.toString();
@@ -43,6 +43,7 @@ export function streamAddress(page: string): { [name in "address" | "probe" | "s
   return {
     address: stream.toString(), probe, surface: place("surface").toString(), stack: place("stack").toString(),
     schema: place("schema/order").toString(), pipelines: place("pipelines").toString(),
+    pipelineSchema: place("schema").toString(),
   };
 }
 

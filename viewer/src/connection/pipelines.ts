@@ -19,6 +19,10 @@ export class Pipelines {
     this.listeners.push(listener);
   }
 
+  get all(): readonly Pipeline[] {
+    return this.known;
+  }
+
   get(name: string | null): Pipeline | undefined {
     return this.known.find((pipeline) => pipeline.name === name);
   }
@@ -69,4 +73,6 @@ export class Pipelines {
   }
 }
 
-const replaced = (pipelines: readonly Pipeline[], by: Pipeline): Pipeline[] => [...pipelines.filter(({ name }) => name !== by.name), by];
+/** The pipelines with one in the place of that of its name, or behind them. */
+const replaced = (pipelines: readonly Pipeline[], by: Pipeline): Pipeline[] =>
+  (pipelines.some(({ name }) => name === by.name) ? pipelines.map((known) => (known.name === by.name ? by : known)) : [...pipelines, by]);

@@ -72,6 +72,9 @@ export type ToldHello = Omit<Hello, "stack" | "undoable"> & { stack?: StackInfor
 
 export interface QualitySummary { min: number; mean?: number; inverted?: number }
 
+/** What a pipeline has cost so far; it runs at one in `every` of its times. */
+export interface PipelineCost { name: string; runs: number; seconds: number; bytes: number; memory: number; every: number }
+
 export interface Status {
   cycle: number;
   time: number;
@@ -81,6 +84,7 @@ export interface Status {
   viewers?: number;
   driver?: string | number | null;
   quality?: QualitySummary | null;
+  pipelines?: PipelineCost[];
   /** Why the journal cannot be written; while it cannot, no order is taken. */
   journal_lost?: string | null;
 }

@@ -1,19 +1,11 @@
 /**
  * The geometry kernel: a WebAssembly module of the very code that changes the shape in the solver (`viewer/wasm`).
  *
- * Whatever goes wrong is a `KernelError`. Where the module itself fails, its memory is given up, a new instance takes its place,
- * and the surfaces that were open are opened again when they are next used.
+ * Where the module itself fails, the surfaces that were open are opened again when they are next used.
  */
 import type { Association, DataFrame, Frame, Json, TopologyFrame } from "../connection/protocol";
-
-export type FailureKind = "handle" | "input" | "json" | "frame" | "surface" | "edit" | "skeleton" | "memory" | "trap";
-
-export class KernelError extends Error {
-  constructor(readonly kind: FailureKind, message: string) {
-    super(message);
-    this.name = "KernelError";
-  }
-}
+import { Module, compile, encoder } from "./module";
+import type { Border } from "./module";
 
 /** The parts of a surface; points interleaved, faces by point numbers. */
 export interface SurfaceParts {
@@ -47,9 +39,7 @@ interface FrameHeader {
   fields: { name: string; association: Association; components: number }[];
 }
 
-interface Exports {
-  memory: WebAssembly.Memory;
-  input(bytes: number): number;
+interface Exports extends Border {
   open_surface(): number;
   create_surface(points: number, faces: number, corners: number): number;
   close_surface(surface: number): void;
@@ -59,40 +49,19 @@ interface Exports {
   skeleton(surface: number): number;
   decode_frame(): number;
   rehearse(): number;
-  arrays(): number;
-  array(index: number): number;
-  array_bytes(index: number): number;
-  panic_text(): number;
-  panic_text_bytes(): number;
 }
-
-const encoder = new TextEncoder();
-const decoder = new TextDecoder();
 
 /** Compiles the module while it is still arriving. Workers are sent what this gives. */
-export async function compileKernel(): Promise<WebAssembly.Module> {
-  const response = await fetch(new URL("../../wasm/pkg/kernel.wasm", import.meta.url));
-  if (!response.ok) throw new KernelError("trap", `the geometry kernel did not arrive: ${response.status} ${response.statusText}`);
-  return WebAssembly.compileStreaming(response);
-}
+export const compileKernel = (): Promise<WebAssembly.Module> => compile(new URL("../../wasm/pkg/kernel.wasm", import.meta.url), "the geometry kernel");
 
-export class Kernel {
-  private exports: Exports;
-  /** How many instances there have been: a surface of an earlier one must be opened again. */
-  generation = 0;
-
-  constructor(private readonly module: WebAssembly.Module) {
-    this.exports = this.instantiate();
+export class Kernel extends Module<Exports> {
+  constructor(module: WebAssembly.Module) {
+    super(module, "the geometry kernel");
   }
 
   /** Has the module make a small edit of its own, so that the engine has compiled it well before the first that somebody waits for. */
   rehearse(): void {
     this.call([], (exports) => exports.rehearse(), () => undefined);
-  }
-
-  /** The bytes that the module's memory takes. */
-  get memory(): number {
-    return this.exports.memory.buffer.byteLength;
   }
 
   /** Opens the surface of a frame, as a server sends it. */
@@ -122,60 +91,6 @@ export class Kernel {
       };
       return [frame, data];
     }).answer;
-  }
-
-  /**
-   * One call: `input` is written into the module's memory one part after the other, `run` is called, and `read` reads what it
-   * answers. `result` is what `run` returned.
-   */
-  call<T>(input: readonly Uint8Array[], run: (exports: Exports) => number, read: () => T): { result: number; answer: T } {
-    try {
-      const size = input.reduce((sum, part) => sum + part.byteLength, 0);
-      let at = this.exports.input(size) >>> 0;
-      if (at === 0) throw new KernelError("memory", `there is not enough memory for ${size} bytes`);
-      for (const part of input) {
-        new Uint8Array(this.exports.memory.buffer, at, part.byteLength).set(part);
-        at += part.byteLength;
-      }
-      const result = run(this.exports) >>> 0;
-      if (result === 0) {
-        const [kind, ...message] = this.text(0).split("\n");
-        throw new KernelError(kind as FailureKind, message.join("\n"));
-      }
-      return { result, answer: read() };
-    } catch (error) {
-      if (error instanceof KernelError) throw error;
-      throw this.restart(error);
-    }
-  }
-
-  /** A copy of an array of the last answer. */
-  bytes(index: number): ArrayBuffer {
-    const start = this.exports.array(index) >>> 0;
-    return this.exports.memory.buffer.slice(start, start + (this.exports.array_bytes(index) >>> 0));
-  }
-
-  text(index: number): string {
-    return decoder.decode(this.bytes(index));
-  }
-
-  private instantiate(): Exports {
-    return new WebAssembly.Instance(this.module, {}).exports as unknown as Exports;
-  }
-
-  /** Gives a module up that failed in itself, and says why it did. */
-  private restart(error: unknown): KernelError {
-    let reason = error instanceof Error ? error.message : String(error);
-    try {
-      const start = this.exports.panic_text() >>> 0;
-      const text = decoder.decode(this.exports.memory.buffer.slice(start, start + (this.exports.panic_text_bytes() >>> 0)));
-      if (text !== "") reason = text;
-    } catch {
-      // Too broken to say more.
-    }
-    this.exports = this.instantiate();
-    this.generation++;
-    return new KernelError("trap", `the geometry kernel failed, which is a defect of it: ${reason}`);
   }
 }
 

@@ -15,6 +15,8 @@ export function watchKeys(store: Store<State, Action>, commands: Commands): void
   });
   window.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    // The editor of pipelines has its own.
+    if ((event.target as HTMLElement | null)?.closest?.(".cm-editor")) return;
     const apply = part("apply") as HTMLButtonElement;
     if (event.key === "Enter" && !apply.disabled) {
       event.preventDefault();

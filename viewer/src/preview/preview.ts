@@ -5,7 +5,8 @@
  * computed the newest wish waits and those before it are forgotten, so that a preview never falls behind the hand that makes it.
  */
 import type { Json, SurfaceInformation } from "../connection/protocol";
-import type { FailureKind, ShapeFaults } from "../kernel/kernel";
+import type { ShapeFaults } from "../kernel/kernel";
+import type { FailureKind } from "../kernel/module";
 import type { PreviewAnswer, PreviewRequest } from "./preview.worker";
 import type { Bones } from "../picture/skeleton";
 

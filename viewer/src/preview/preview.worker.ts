@@ -1,6 +1,8 @@
 /** Computes previews of edits away from the thread that draws. */
-import { Kernel, KernelError } from "../kernel/kernel";
-import type { FailureKind, KernelSurface, ShapeFaults, SkeletonDescription, SurfaceDescription } from "../kernel/kernel";
+import { Kernel } from "../kernel/kernel";
+import { KernelError } from "../kernel/module";
+import type { FailureKind } from "../kernel/module";
+import type { KernelSurface, ShapeFaults, SkeletonDescription, SurfaceDescription } from "../kernel/kernel";
 import type { Json } from "../connection/protocol";
 import { segmentsOf } from "../picture/skeleton";
 import type { Bones } from "../picture/skeleton";

@@ -1,8 +1,11 @@
 /** What can happen: from the simulation, or from the person at the page. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
+import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, PipelineChange, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
+import type { LanguageError } from "../kernel/language";
 import type { Look } from "./looks";
+import type { AskedChange } from "./pipeline-drafts";
+import type { Pipeline } from "./pipelines";
 import type { Part, PreviewState, Problem } from "./state";
 
 export type Action =
@@ -23,6 +26,9 @@ export type Action =
   | { type: "followed"; by: number }
   | { type: "note pinned"; note: PinnedNote }
   | { type: "note removed"; number: number }
+  | { type: "pipelines known"; pipelines: readonly Pipeline[] }
+  | { type: "pipelines told"; change: PipelineChange }
+  | { type: "pipelines refused"; id: string; text: string }
   | { type: "refused"; id: string | null; text: string }
   | { type: "unreadable"; text: string }
   | { type: "schema"; form: OrderForm | null; settings: Values }
@@ -31,6 +37,13 @@ export type Action =
   | { type: "order dismissed"; id: string }
   | { type: "wheel answered" }
   | { type: "following"; on: boolean }
+  | { type: "pipelines asked"; asked: Pick<AskedChange, "id" | "key" | "name" | "text"> }
+  // The pipelines that are being written; `began` is what counts as nothing written, the text itself where it is left out.
+  | { type: "pipeline opened"; key: string; replaced: string | null; text: string; began?: string }
+  | { type: "pipeline written"; text: string }
+  | { type: "pipeline checked"; key: string; text: string; errors: readonly LanguageError[]; more: number }
+  | { type: "pipeline left" }
+  | { type: "pipeline discarded"; key: string }
   // The views; `view` is null for all of them.
   | { type: "look"; view: string | null; look: Partial<Look> }
   | { type: "view chosen"; view: string }

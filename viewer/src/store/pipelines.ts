@@ -71,7 +71,7 @@ export function withQuality(pipeline: Pipeline): Pipeline {
 /** The view that takes the fields along a line. */
 export const LINE = "line";
 /** How many points a line has. */
-const LINE_POINTS = 201;
+export const LINE_POINTS = 201;
 
 export function lineBetween(from: Vector, to: Vector): Pipeline {
   return { name: LINE, every: { steps: 5 }, stages: [{ probe: { line: { from, to, count: LINE_POINTS } } }, { stream: {} }] };

@@ -7,6 +7,7 @@ import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
+import { pipelinesAfter } from "./pipeline-drafts";
 import { NO_FORECAST } from "./state";
 import type { Composed, Draft, Frames, Part, State } from "./state";
 import { sameJson } from "./store";
@@ -35,6 +36,7 @@ function after(state: State, action: Action): State {
       return {
         ...state, ...(connected ? {} : NOBODY), askedBy: connected ? state.askedBy : null, coarser: connected ? {} : state.coarser,
         connection: { ...state.connection, state: action.state, explanation: action.explanation, fresh: connected },
+        pipelines: pipelinesAfter(state.pipelines, action),
       };
     }
     case "hello": return withHello(state, action.hello);
@@ -60,6 +62,9 @@ function after(state: State, action: Action): State {
     case "following": return { ...state, following: action.on };
     case "note pinned": return { ...state, notes: [...state.notes.filter(({ number }) => number !== action.note.number), action.note] };
     case "note removed": return { ...state, notes: state.notes.filter(({ number }) => number !== action.number) };
+    case "pipelines known": case "pipelines told": case "pipelines refused": case "pipelines asked":
+    case "pipeline opened": case "pipeline written": case "pipeline checked": case "pipeline left": case "pipeline discarded":
+      return { ...state, pipelines: pipelinesAfter(state.pipelines, action) };
     case "wheel answered": return { ...state, askedBy: null };
     case "refused": {
       const orders = orderRefused(state.orders, action.id, action.text);

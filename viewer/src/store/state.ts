@@ -3,6 +3,8 @@ import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { Looks } from "./looks";
+import { NO_PIPELINES } from "./pipeline-drafts";
+import type { PipelinesState } from "./pipeline-drafts";
 
 export type Part = "handle" | "fixed";
 
@@ -101,6 +103,7 @@ export interface State {
   following: boolean;
   /** The notes that are pinned, the oldest first. */
   notes: readonly PinnedNote[];
+  pipelines: PipelinesState;
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
   /** What went wrong on the way here: frames or messages that could not be read, newest last. */
@@ -121,5 +124,5 @@ export const INITIAL: State = {
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
   orders: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
-  askedBy: null, people: [], followedBy: 0, following: false, notes: [], refusal: "", errors: [],
+  askedBy: null, people: [], followedBy: 0, following: false, notes: [], pipelines: NO_PIPELINES, refusal: "", errors: [],
 };

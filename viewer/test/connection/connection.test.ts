@@ -57,6 +57,7 @@ describe("the address of the stream", () => {
     expect(streamAddress("https://host/run/7/index.html?view=ab#x")).toEqual({
       address: "wss://host/run/7/ws", probe: "https://host/run/7/ws", surface: "https://host/run/7/surface",
       stack: "https://host/run/7/stack", schema: "https://host/run/7/schema/order", pipelines: "https://host/run/7/pipelines",
+      pipelineSchema: "https://host/run/7/schema",
     });
   });
 });

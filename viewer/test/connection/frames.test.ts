@@ -1,7 +1,8 @@
 /** The frames that the encoder makes (`pipelines/tests/encode.rs` keeps them up to date), decoded by the module. */
 import { readFileSync } from "node:fs";
 import { beforeEach, describe, expect, it } from "vitest";
-import { Kernel, KernelError } from "../../src/kernel/kernel";
+import { Kernel } from "../../src/kernel/kernel";
+import { KernelError } from "../../src/kernel/module";
 import type { DataFrame, TopologyFrame } from "../../src/connection/protocol";
 import { wasm } from "../wasm";
 

@@ -1,5 +1,6 @@
 import { beforeAll, describe, expect, it } from "vitest";
-import { Kernel, KernelError } from "../../src/kernel/kernel";
+import { Kernel } from "../../src/kernel/kernel";
+import { KernelError } from "../../src/kernel/module";
 import type { SurfaceParts } from "../../src/kernel/kernel";
 import { wasm } from "../wasm";
 

@@ -11,7 +11,7 @@ use tombolo_deform::surface::{Surface, SurfaceError};
 use tombolo_pipelines::encode::{DecodeError, DecodedFrame, Decoder, decode_surface};
 use tombolo_pipelines::extract::Field;
 
-use crate::Array;
+use crate::{Array, checker};
 
 /// The input of one call and the answer to it; the surfaces that are open.
 #[derive(Default)]
@@ -226,6 +226,13 @@ impl Kernel {
         let input = std::mem::take(&mut self.input);
         let frame = self.decoder.decode(&input).map_err(Failure::from);
         self.settle(frame.map(arrays))
+    }
+
+    /// Answers with the errors of a pipeline: [`check_pipeline`](crate::check_pipeline).
+    pub fn check_pipeline(&mut self) -> bool {
+        let input = std::mem::take(&mut self.input);
+        let errors = checker::check(&input).map_err(Failure::from);
+        self.settle(errors.map(|errors| vec![Array::Text(errors)]))
     }
 
     fn surface(&mut self, surface: u32) -> Result<&mut Open, Failure> {

@@ -1,5 +1,8 @@
-//! The geometry kernel as a WebAssembly module: what the viewer previews is computed by the code
-//! that the solver runs.
+//! What the viewer has of the code that the solver runs, as WebAssembly: the geometry kernel, by which
+//! it previews, and the language, by which it checks what is typed.
+//!
+//! These are two modules, as a page needs the first at once and the second seldom. Each is built with
+//! the feature of its name, `kernel` or `language`.
 //!
 //! The border is plain C and takes numbers only. A call's arguments beyond numbers are written into
 //! the room that [`input`] makes; what it answers stands in arrays of the module's memory until the
@@ -17,6 +20,7 @@
 //! | [`skeleton`] | | 1 | nodes `f64`, the number of nodes of each curve `u32`, their nodes `u32`, the node of each vertex `u32` |
 //! | [`decode_frame`] | the next frame of a view | 1 | its header (JSON), points `f32`, each field `f32`; where it brought cells: triangles `u32`, lines `u32`, the feature of each triangle `u32` |
 //! | [`rehearse`] | | | |
+//! | [`check_pipeline`] | a pipeline and the run it is for (JSON) | 1 | its errors (JSON) |
 //!
 //! Nothing here panics on any input. Should the kernel do so all the same, the module traps: its
 //! memory can no longer be relied on, [`panic_text`] says what happened, and the caller makes a new
@@ -27,13 +31,26 @@
 //! own sandbox.
 
 mod answer;
+mod checker;
+#[cfg(feature = "kernel")]
+mod geometry;
 mod kernel;
+#[cfg(feature = "language")]
+mod language;
+#[cfg(feature = "kernel")]
 mod rehearsal;
 
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 pub use answer::Array;
+#[cfg(feature = "kernel")]
+pub use geometry::{
+    check, close_surface, create_surface, decode_frame, describe_surface, displacement,
+    open_surface, rehearse, skeleton,
+};
 pub use kernel::{Failure, Kernel};
+#[cfg(feature = "language")]
+pub use language::check_pipeline;
 
 static KERNEL: Mutex<Kernel> = Mutex::new(Kernel::new());
 static PANIC: Mutex<String> = Mutex::new(String::new());
@@ -51,66 +68,6 @@ pub extern "C" fn input(bytes: usize) -> *mut u8 {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| std::panic::set_hook(Box::new(|panic| *lock(&PANIC) = panic.to_string())));
     lock(&KERNEL).input(bytes).map_or(std::ptr::null_mut(), <[u8]>::as_mut_ptr)
-}
-
-/// Opens the surface of a message. Returns its number, 0 where there is none.
-#[unsafe(no_mangle)]
-pub extern "C" fn open_surface() -> u32 {
-    lock(&KERNEL).open_surface()
-}
-
-/// Opens the surface of these arrays, one after the other, little endian: the coordinates of its
-/// points (`3 * points` doubles), their mesh vertices (`points` 32-bit numbers, rising), the number
-/// of points of each face (`faces`), their points (`corners`), the feature of each face (`faces`),
-/// and the names of the features as a JSON list. Returns its number, 0 where it is none.
-#[unsafe(no_mangle)]
-pub extern "C" fn create_surface(points: usize, faces: usize, corners: usize) -> u32 {
-    lock(&KERNEL).create_surface(points, faces, corners)
-}
-
-/// Forgets a surface and all that was set up for it.
-#[unsafe(no_mangle)]
-pub extern "C" fn close_surface(surface: u32) {
-    lock(&KERNEL).close_surface(surface);
-}
-
-/// The points, triangles and features of a surface, to be drawn.
-#[unsafe(no_mangle)]
-pub extern "C" fn describe_surface(surface: u32) -> u32 {
-    lock(&KERNEL).describe_surface(surface).into()
-}
-
-/// The displacement of each vertex of a surface that a stack of edits asks for.
-#[unsafe(no_mangle)]
-pub extern "C" fn displacement(surface: u32) -> u32 {
-    lock(&KERNEL).displacement(surface).into()
-}
-
-/// The fault of the shape that the last [`displacement`] of a surface leads to, and the triangles
-/// at fault: those of the faces that the report names.
-#[unsafe(no_mangle)]
-pub extern "C" fn check(surface: u32) -> u32 {
-    lock(&KERNEL).check(surface).into()
-}
-
-/// The skeleton of a surface, extracted when it is first needed.
-#[unsafe(no_mangle)]
-pub extern "C" fn skeleton(surface: u32) -> u32 {
-    lock(&KERNEL).skeleton(surface).into()
-}
-
-/// The header and the arrays of the next frame of a view, in single precision, as they are drawn;
-/// tuple after tuple. What is known of a view is kept for its frames to come.
-#[unsafe(no_mangle)]
-pub extern "C" fn decode_frame() -> u32 {
-    lock(&KERNEL).decode_frame().into()
-}
-
-/// Makes a small edit of its own, so that the engine compiles the kernel well before somebody waits
-/// for it. Takes some 50 milliseconds and changes nothing; returns how many vertices it moved.
-#[unsafe(no_mangle)]
-pub extern "C" fn rehearse() -> usize {
-    rehearsal::rehearse().iter().filter(|by| **by != [0.0; 3]).count()
 }
 
 /// The number of arrays in the last answer.

@@ -1,0 +1,41 @@
+/** Has a pipeline checked away from the thread that draws: of several that wait only the newest is. */
+import type { PipelineErrors, PipelineQuestion } from "../kernel/language";
+
+/** The part of a worker that is needed, so that a test can stand in for it. */
+export interface CheckWorker {
+  postMessage(message: unknown): void;
+  onmessage: ((event: MessageEvent<CheckAnswer>) => void) | null;
+}
+
+/** What the worker answers: the errors of the text, or why it could not be checked. */
+export type CheckAnswer = PipelineErrors | { failure: string };
+
+export class Checker {
+  private worker: CheckWorker | null = null;
+  private underway: ((answer: CheckAnswer) => void) | null = null;
+  private waiting: { question: PipelineQuestion; told: (answer: CheckAnswer) => void } | null = null;
+
+  /** `start` makes the worker when it is first needed. */
+  constructor(private readonly start: () => CheckWorker) {}
+
+  check(question: PipelineQuestion, told: (answer: CheckAnswer) => void): void {
+    this.waiting = { question, told };
+    if (!this.underway) this.next();
+  }
+
+  private next(): void {
+    const { waiting } = this;
+    this.waiting = null;
+    this.underway = waiting?.told ?? null;
+    if (!waiting) return;
+    if (!this.worker) {
+      this.worker = this.start();
+      this.worker.onmessage = ({ data }) => {
+        const told = this.underway;
+        this.next();
+        told?.(data);
+      };
+    }
+    this.worker.postMessage(waiting.question);
+  }
+}

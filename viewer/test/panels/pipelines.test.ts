@@ -1,0 +1,180 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it, vi } from "vitest";
+import { PipelineEditorPanel, knownNames } from "../../src/panels/pipeline-editor";
+import { PipelinesPanel } from "../../src/panels/pipelines";
+import { Checker } from "../../src/pipelines/checker";
+import type { CheckAnswer, CheckWorker } from "../../src/pipelines/checker";
+import type { PipelineQuestion } from "../../src/kernel/language";
+import { keyOf, readDrafts } from "../../src/store/pipeline-drafts";
+import type { Pipeline } from "../../src/store/pipelines";
+import { STATUS, page } from "../page";
+import { openDocument } from "./document";
+
+const cut: Pipeline = { name: "cut", every: { steps: 5 }, stages: [{ slice: { origin: [1, 0, 0], normal: [1, 0, 0] } }, { stream: {} }] };
+const health: Pipeline = { name: "health", stages: [{ quality: {} }] };
+
+/** A worker that finds what `find` finds. */
+function worker(find: (question: PipelineQuestion) => CheckAnswer): CheckWorker {
+  const made: CheckWorker = { onmessage: null, postMessage: (question) => made.onmessage?.({ data: find(question as PipelineQuestion) } as MessageEvent<CheckAnswer>) };
+  return made;
+}
+
+/** Stands in for the editor, which needs a browser. */
+class FakeEditor {
+  static made: FakeEditor;
+  shown: [string, boolean] = ["", false];
+  marks: readonly { text: string }[] = [];
+  replace = vi.fn();
+  goTo = vi.fn();
+  constructor(_: HTMLElement, __: string, readonly surroundings: { written(text: string): void; apply(): void; leave(): void }) { FakeEditor.made = this; }
+  show(text: string, isReadOnly: boolean): void { this.shown = [text, isReadOnly]; }
+  mark(marks: readonly { text: string }[]): void { this.marks = marks; }
+  focus(): void { document.getElementById("pipeline-close")!.focus(); }
+}
+
+describe("the pipelines of a run", () => {
+  let made: ReturnType<typeof page>;
+  let asked: PipelineQuestion[];
+  let answer: CheckAnswer;
+  const at = <T extends HTMLElement = HTMLButtonElement>(id: string): T => document.getElementById(id) as T;
+  const row = (name: string): HTMLElement => [...document.querySelectorAll<HTMLElement>("#pipelines li")].find(({ dataset }) => dataset.pipeline === name)!;
+  const act = (name: string, kind: string): HTMLElement => row(name).querySelector<HTMLElement>(`[data-act="${kind}"]`)!;
+  const last = (): { id: string; [key: string]: unknown } => made.sent.at(-1) as never;
+  const told = (status: "accepted" | "applied", id = last().id): void => made.store.dispatch({ type: "pipelines told", change: { id, status, cycle: 130 } });
+  const known = (...pipelines: Pipeline[]): void => made.store.dispatch({ type: "pipelines known", pipelines });
+  const settle = async (): Promise<void> => { await vi.advanceTimersByTimeAsync(200); };
+  const draft = () => made.store.state.pipelines.drafts[made.store.state.pipelines.open ?? ""];
+
+  beforeEach(() => {
+    vi.useFakeTimers();
+    Element.prototype.scrollIntoView = () => undefined;
+    openDocument();
+    made = page({ fields: [{ name: "pressure", association: "vertex", components: 1, unit: "Pa" }], monitors: [{ pipeline: "health", name: "quality.min" }] });
+    [asked, answer] = [[], { errors: [], more: 0 }];
+    new PipelinesPanel(made.store, made.commands, () => null);
+    new PipelineEditorPanel(made.store, made.commands, {
+      schema: () => Promise.resolve({}), load: () => Promise.resolve({ PipelineEditor: FakeEditor as never }),
+      checker: new Checker(() => worker((question) => {
+        asked.push(question);
+        return answer;
+      })),
+    }, () => undefined);
+    known(cut, health);
+    return () => vi.useRealTimers();
+  });
+
+  it("are listed with what they do, when, and what that costs", async () => {
+    made.store.dispatch({ type: "status", status: { ...STATUS, pipelines: [{ name: "cut", runs: 2, seconds: 0.004, bytes: 3000, memory: 0, every: 1 }] }, at: 0 });
+    await vi.advanceTimersByTimeAsync(1000);
+    expect([...row("cut").querySelectorAll(".title, .detail")].map(({ textContent }) => textContent)).toEqual(["cut", "slice across x at 1 → streamed", "every 5 steps · 2\u00a0ms, 1.5\u00a0kB a run"]);
+    expect(knownNames(made.store.state)).toMatchObject({ features: ["inlet", "outlet", "wall", "throat"], monitors: ["quality.min"] });
+  });
+
+  it("are read by one who watches, and changed by nobody else than the one who steers", async () => {
+    made.greet({ role: "watcher", may_drive: false });
+    expect(at("pipeline-add").disabled).toBe(true);
+    expect(at("pipelines-who").textContent).toBe("This link is for watching only. Pipelines can be read.");
+    for (const kind of ["duplicate", "remove"]) {
+      expect(act("cut", kind).getAttribute("aria-disabled")).toBe("true");
+      act("cut", kind).click();
+    }
+    expect([made.store.state.pipelines.open, row("cut").classList.contains("question")]).toEqual([null, false]);
+    act("cut", "load").click();
+    await settle();
+    expect(FakeEditor.made.shown[1]).toBe(true);
+    FakeEditor.made.surroundings.apply();
+    expect([at("pipeline-apply").disabled, made.sent.length]).toEqual([true, 0]);
+  });
+
+  it("are changed in the editor once they are without errors", async () => {
+    act("cut", "load").click();
+    await settle();
+    expect([at("pipelines-list").hidden, at("pipeline-title").textContent, at("pipeline-apply").disabled]).toEqual([true, "cut", true]);
+    answer = { errors: [{ line: 1, column: 2, path: "nmae", message: "found the unknown key `nmae`", suggestion: "name" }], more: 0 };
+    FakeEditor.made.surroundings.written('{"nmae": "cut"}');
+    await settle();
+    expect(asked.at(-1)).toEqual({ text: '{"nmae": "cut"}', replaced: "cut", pipelines: [cut, health], parameters: [] });
+    expect([at("pipeline-apply").disabled, at("pipeline-state").textContent, FakeEditor.made.marks.length]).toEqual([true, "1 error.", 1]);
+    document.querySelector<HTMLElement>('#pipeline-errors [data-act="fix"]')!.click();
+    expect(FakeEditor.made.replace).toHaveBeenCalledWith(1, 7, '"name"');
+    answer = { errors: [], more: 0 };
+    const text = '{"name": "cut", "stages": []}';
+    FakeEditor.made.surroundings.written(text);
+    await settle();
+    FakeEditor.made.surroundings.apply();
+    expect(last()).toMatchObject({ pipelines: { set: [{ name: "cut", stages: [] }] } });
+    told("accepted");
+    expect(at("pipeline-told").textContent).toMatch(/^The run has taken it/);
+    told("applied");
+    known({ name: "cut", stages: [] }, health);
+    expect([at("pipeline-told").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
+  });
+
+  it("are refused in words, with a mark where that is", async () => {
+    act("health", "load").click();
+    await settle();
+    FakeEditor.made.surroundings.written('{"name": "health", "stages": [{"statistics": {"field": "presure"}}]}');
+    await settle();
+    at("pipeline-apply").click();
+    made.store.dispatch({ type: "pipelines refused", id: last().id, text: "pipeline `health`: there is no field 'presure'; did you mean 'pressure'?" });
+    expect(at("pipeline-told").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
+    expect(FakeEditor.made.marks).toMatchObject([{ fix: { name: "pressure", insert: '"pressure"' } }]);
+  });
+
+  it("take another name in one change, and are added under a free one", async () => {
+    act("cut", "load").click();
+    await settle();
+    FakeEditor.made.surroundings.written('{"name": "across", "stages": []}');
+    await settle();
+    at("pipeline-apply").click();
+    expect(last()).toMatchObject({ pipelines: { all: [{ name: "across", stages: [] }, health] } });
+    told("applied");
+    known({ name: "across", stages: [] }, health);
+    FakeEditor.made.surroundings.leave();
+    act("health", "duplicate").click();
+    await settle();
+    expect(JSON.parse(draft()!.text)).toEqual({ ...health, name: "health 2" });
+    at("pipeline-apply").click();
+    expect(last()).toMatchObject({ pipelines: { set: [{ name: "health 2" }] } });
+  });
+
+  it("are kept as drafts when the editor is left, and taken up again", async () => {
+    act("cut", "load").click();
+    await settle();
+    FakeEditor.made.surroundings.written("{");
+    FakeEditor.made.surroundings.leave();
+    expect([at("pipelines-list").hidden, row("cut").querySelector(".chip")?.textContent, document.activeElement]).toEqual([false, "draft", act("cut", "load")]);
+    act("cut", "load").click();
+    expect(draft()).toMatchObject({ text: "{", replaced: "cut" });
+    // Over a reload too; rubbish counts as nothing.
+    expect(readDrafts(JSON.stringify(made.store.state.pipelines.drafts))[keyOf("cut")]).toMatchObject({ text: "{", replaced: "cut" });
+    expect([readDrafts(null), readDrafts("{"), readDrafts('{"a": {"text": 3}}')]).toEqual([{}, {}, {}]);
+    at("pipeline-revert").click();
+    FakeEditor.made.surroundings.leave();
+    expect(row("cut").querySelector(".chip")).toBeNull();
+  });
+
+  it("are removed once that is confirmed", () => {
+    act("cut", "remove").click();
+    expect([row("cut").textContent, document.activeElement]).toEqual(["Remove cut?RemoveKeep", act("cut", "keep")]);
+    act("cut", "keep").click();
+    expect(made.sent.length).toBe(0);
+    act("cut", "remove").click();
+    act("cut", "remove").click();
+    expect(last()).toMatchObject({ pipelines: { remove: ["cut"] } });
+    made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    expect(at("pipeline-told").textContent).toMatch(/^The connection was lost/);
+  });
+
+  it("begin with a template, in a menu that the keyboard opens and closes", async () => {
+    at("pipeline-add").click();
+    expect(document.activeElement).toBe(document.querySelector('[data-template="slice"]'));
+    at("pipeline-templates").dispatchEvent(new KeyboardEvent("keydown", { key: "Escape", bubbles: true, cancelable: true }));
+    expect([at("pipeline-templates").hidden, document.activeElement]).toEqual([true, at("pipeline-add")]);
+    at("pipeline-add").click();
+    document.querySelector<HTMLElement>('[data-template="statistics"]')!.click();
+    await settle();
+    expect(at("pipeline-title").textContent).toBe("New pipeline");
+    expect([JSON.parse(draft()!.text).stages, at("pipeline-apply").disabled]).toEqual([[{ statistics: { field: "velocity" } }], false]);
+  });
+});
