@@ -182,9 +182,12 @@ impl Proxy {
         );
         let file = directory.join("nginx.conf");
         std::fs::write(&file, text).expect("written");
-        let mut command = std::process::Command::new("/usr/sbin/nginx");
+        let unpacked = concat!(env!("CARGO_MANIFEST_DIR"), "/../.venv/nginx/usr/sbin/nginx");
+        let is_unpacked = Path::new(unpacked).exists();
+        let program = if is_unpacked { unpacked } else { "/usr/sbin/nginx" };
+        let mut command = std::process::Command::new(program);
         let child = command.arg("-e").arg(directory.join("error.log")).arg("-c").arg(file).spawn();
-        Self(child.expect("nginx, which scripts/setup installs"))
+        Self(child.expect("nginx, which scripts/setup unpacks"))
     }
 }
 
