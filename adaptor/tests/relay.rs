@@ -17,6 +17,7 @@ use common::{
 };
 use serde_json::{Value, json};
 use tempfile::TempDir;
+use tokio_tungstenite::tungstenite::{self, WebSocket};
 use tombolo::{
     Settings,
     client::{Client, ClientError, Event, Link, Options},
@@ -34,9 +35,14 @@ struct Here {
 
 impl Here {
     fn new(tls: Option<Tls>) -> Self {
+        Self::with(|settings| settings.tls = tls)
+    }
+
+    fn with(set: impl FnOnce(&mut RelaySettings)) -> Self {
         let directory = tempfile::tempdir().expect("a directory");
         let listen = "127.0.0.1:0".parse().expect("an address");
-        let settings = RelaySettings { listen, tls, ..RelaySettings::new(directory.path()) };
+        let mut settings = RelaySettings { listen, ..RelaySettings::new(directory.path()) };
+        set(&mut settings);
         Self { relay: Relay::start(&settings).expect("a relay"), directory }
     }
 
@@ -61,6 +67,24 @@ impl Here {
     /// The names of the runs that are listed.
     fn names(&self) -> Vec<String> {
         names(self.relay.address(), &self.secret())
+    }
+
+    /// The secret for runs.
+    fn secret_for_runs(&self) -> String {
+        let file = self.directory.path().join("runs.json");
+        let kept = std::fs::read_to_string(file).expect("read");
+        let kept: Value = serde_json::from_str(&kept).expect("an object");
+        kept["relay"].as_str().expect("a secret").to_owned()
+    }
+
+    /// A connection like that of a run, with its first words.
+    fn attach(&self, first: &str) -> WebSocket<TcpStream> {
+        let address = self.relay.address();
+        let stream = TcpStream::connect(address).expect("connected");
+        let address = format!("ws://{address}/-/attach?token={}", self.secret_for_runs());
+        let (mut socket, _) = tungstenite::client(&address, stream).expect("let in");
+        let _ = socket.send(tungstenite::Message::text(first));
+        socket
     }
 
     fn get(&self, path: &str, headers: &[(&str, &str)]) -> Answer {
@@ -184,7 +208,7 @@ fn three_runs_are_listed_and_one_is_driven() {
     }
     // The name leads to the page of the run, and the page needs nothing.
     let moved = here.get("/wing?x=1", &[]);
-    assert_eq!((moved.status, moved.header("location")), (308, Some("/wing/?x=1")));
+    assert_eq!((moved.status, moved.header("location")), (308, Some("wing/?x=1")));
     assert_eq!(here.get("/wing/", &[]).status, 200);
 }
 
@@ -331,6 +355,25 @@ fn through_tls_a_run_knows_its_relay_by_the_certificate() {
     }
 }
 
+#[test]
+fn behind_a_proxy_runs_know_the_relay_and_viewers_come_by_its_public_name() {
+    let here = Here::with(|settings| {
+        settings.tls = Some(Tls::default());
+        settings.public = Some("https://portal.example/tombolo/".into());
+    });
+    let connect = here.stream("nozzle")["connect"].to_string();
+    assert!(connect.contains("#sha256="), "{connect}");
+    let link = here.relay.link();
+    assert!(link.starts_with("https://portal.example/tombolo/?token="), "{link}");
+    assert!(!link.contains("sha256"), "{link}");
+    let here = Here::with(|settings| settings.public = Some("https://portal.example".into()));
+    let bearer = format!("Bearer {}", here.secret());
+    for (host, status) in [("portal.example", 200), ("localhost", 200), ("evil.example", 403)] {
+        let headers = [("Authorization", &*bearer), ("Host", host)];
+        assert_eq!(here.get("/-/runs", &headers).status, status, "{host}");
+    }
+}
+
 /// The program, as a process of its own.
 struct Program(Child);
 
@@ -439,6 +482,35 @@ fn a_viewer_that_never_reads_costs_the_others_nothing() {
 }
 
 #[test]
+fn an_answer_may_take_longer_than_a_request() {
+    let here = Here::new(None);
+    let mut run = here.attach(r#"{"version": 1, "name": "slow", "instance": "0123456789abcdef"}"#);
+    run.read().expect("taken in");
+    let address = here.relay.address();
+    let secret = here.secret_for_runs();
+    std::thread::scope(|scope| {
+        let asking = scope.spawn(|| here.get("/slow/surface", &[]));
+        let open: Value = loop {
+            if let tungstenite::Message::Text(text) = run.read().expect("asked") {
+                break serde_json::from_str(&text).expect("an object");
+            }
+        };
+        let mut carried = TcpStream::connect(address).expect("connected");
+        let head = format!(
+            "GET /-/carry/{} HTTP/1.1\r\nHost: {address}\r\nAuthorization: Bearer {secret}\r\n\
+             Connection: Upgrade\r\nUpgrade: tombolo\r\n\r\n",
+            open["ticket"].as_str().expect("a ticket")
+        );
+        carried.write_all(head.as_bytes()).expect("written");
+        // The viewer has shown no secret: it is given five seconds to ask.
+        std::thread::sleep(Duration::from_secs(7));
+        carried.write_all(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nhi").expect("written");
+        let answer = asking.join().expect("an answer");
+        assert_eq!((answer.status, answer.body.as_str()), (200, "hi"), "{answer:?}");
+    });
+}
+
+#[test]
 fn half_requests_and_rubbish_keep_nobody_out() {
     let here = Here::new(None);
     let run = here.run("nozzle");
@@ -458,17 +530,10 @@ fn half_requests_and_rubbish_keep_nobody_out() {
     assert_eq!(here.names(), ["nozzle"]);
     drop(idle);
     // Rubbish in place of a run's first words.
-    let secret = std::fs::read_to_string(here.directory.path().join("runs.json")).expect("read");
-    let secret: Value = serde_json::from_str(&secret).expect("an object");
-    let secret = secret["relay"].as_str().expect("a secret");
     for first in
         ["", "{}", "null", r#"{"version": 1, "name": "../x", "instance": "0123456789abcdef"}"#]
     {
-        let stream = TcpStream::connect(here.relay.address()).expect("connected");
-        let address = format!("ws://{}/-/attach?token={secret}", here.relay.address());
-        let (mut socket, _) =
-            tokio_tungstenite::tungstenite::client(&address, stream).expect("let in");
-        let _ = socket.send(tokio_tungstenite::tungstenite::Message::text(first));
+        let mut socket = here.attach(first);
         until("the end of it", || socket.read().map_or(true, |said| said.is_close()));
     }
     assert_eq!(here.names(), ["nozzle"]);

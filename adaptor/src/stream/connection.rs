@@ -72,9 +72,25 @@ impl Connection {
         self.pool.know(&self.guest, access)
     }
 
+    /// Takes note of a request that the server answers once this is dropped: until then the client has
+    /// nothing to say.
+    pub(super) fn asked(&self) -> Asked {
+        self.guest.unanswered.fetch_add(1, Ordering::AcqRel);
+        Asked(Arc::clone(&self.guest))
+    }
+
     /// From here on silence is measured from the last byte, not from the last answer.
     pub(super) fn upgraded(&self) {
         self.guest.is_upgraded.store(true, Ordering::Relaxed);
+    }
+}
+
+/// A request that has not been answered.
+pub(super) struct Asked(Arc<Guest>);
+
+impl Drop for Asked {
+    fn drop(&mut self) {
+        self.0.unanswered.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
@@ -181,8 +197,10 @@ impl AsyncRead for TimedStream {
             return read;
         }
         while this.read_deadline.as_mut().poll(context).is_ready() {
-            // One who is behind with reading is judged by that.
-            if this.write_deadline.is_none() {
+            // One who is behind with reading is judged by that, and one who waits for an answer not at
+            // all.
+            let waits = this.connection.guest.unanswered.load(Ordering::Acquire) > 0;
+            if this.write_deadline.is_none() && !waits {
                 return Poll::Ready(Err(timed_out("the client says nothing")));
             }
             this.still_here();

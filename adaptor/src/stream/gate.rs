@@ -51,6 +51,8 @@ pub(super) struct Gate {
     pub(super) refusals: Refusals,
     /// Whether it listens on a loopback address.
     pub(super) is_loopback: bool,
+    /// The host of the address that a proxy before it has, if one was named.
+    pub(super) public: Option<String>,
     pub(super) is_encrypted: bool,
 }
 
@@ -62,6 +64,7 @@ pub(super) async fn guard(
     mut request: Request,
     next: Next,
 ) -> Response {
+    let _asked = connection.asked();
     let answer = shared.gate.admit(&connection, &mut request);
     let access = request.extensions().get::<Holder>().map(|holder| holder.access);
     let mut response = match answer {
@@ -121,7 +124,7 @@ impl Gate {
     /// the relay's, which has looked at it.
     pub(super) fn foreign(&self, connection: &Connection, request: &Request) -> Option<Response> {
         let is_loopback = self.is_loopback && connection.way() == Way::Direct;
-        foreign(request.uri(), request.headers(), is_loopback)
+        foreign(request.uri(), request.headers(), is_loopback, self.public.as_deref())
             .map(|reason| (StatusCode::FORBIDDEN, reason).into_response())
     }
 
@@ -205,8 +208,14 @@ pub(super) async fn holders_only(request: Request, next: Next) -> Response {
     }
 }
 
-/// Why a request is refused for the name or the page that it comes by.
-fn foreign(uri: &Uri, headers: &HeaderMap, loopback: bool) -> Option<&'static str> {
+/// Why a request is refused for the name or the page that it comes by. A server on a loopback address
+/// answers to the names of this machine, and to the public one of its proxy.
+fn foreign(
+    uri: &Uri,
+    headers: &HeaderMap,
+    loopback: bool,
+    public: Option<&str>,
+) -> Option<&'static str> {
     let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or(""));
     let host = text(header::HOST).unwrap_or("");
     if headers.get_all(header::HOST).iter().count() > 1
@@ -215,10 +224,9 @@ fn foreign(uri: &Uri, headers: &HeaderMap, loopback: bool) -> Option<&'static st
         return Some("this request names more than one host\n");
     }
     // Any port will do: a tunnel may end on another one.
-    let name = host
-        .rsplit_once(':')
-        .map_or(host, |(name, port)| if port.ends_with(']') { host } else { name });
-    if loopback && !matches!(name, "localhost" | "127.0.0.1" | "[::1]") {
+    let name = without_port(host);
+    let is_own = matches!(name, "localhost" | "127.0.0.1" | "[::1]");
+    if loopback && !is_own && !public.is_some_and(|public| name.eq_ignore_ascii_case(public)) {
         return Some("this server answers to localhost, 127.0.0.1 and [::1] only\n");
     }
     match text(header::ORIGIN) {
@@ -227,6 +235,13 @@ fn foreign(uri: &Uri, headers: &HeaderMap, loopback: bool) -> Option<&'static st
         }
         _ => None,
     }
+}
+
+/// The host of an address such as `host:7070` or `[::1]`.
+pub(super) fn without_port(authority: &str) -> &str {
+    authority
+        .rsplit_once(':')
+        .map_or(authority, |(name, port)| if port.ends_with(']') { authority } else { name })
 }
 
 /// Which addresses were refused of late.
@@ -268,7 +283,7 @@ mod tests {
             ("localhost", Some("https://localhost")),
         ] {
             assert_eq!(
-                foreign(&Uri::from_static("/"), &headers(host, origin), true),
+                foreign(&Uri::from_static("/"), &headers(host, origin), true, None),
                 None,
                 "{host} {origin:?}"
             );
@@ -282,14 +297,22 @@ mod tests {
             ("", None),
         ] {
             assert!(
-                foreign(&Uri::from_static("/"), &headers(host, origin), true).is_some(),
+                foreign(&Uri::from_static("/"), &headers(host, origin), true, None).is_some(),
                 "{host} {origin:?}"
             );
         }
         assert_eq!(
-            foreign(&Uri::from_static("/"), &headers("cluster.example:7070", None), false),
+            foreign(&Uri::from_static("/"), &headers("cluster.example:7070", None), false, None),
             None
         );
+        // A proxy before it keeps the name that the browser has used.
+        for (host, is_well) in
+            [("Portal.example", true), ("portal.example:8443", true), ("other.example", false)]
+        {
+            let headers = headers(host, None);
+            let found = foreign(&Uri::from_static("/"), &headers, true, Some("portal.example"));
+            assert_eq!(found.is_none(), is_well, "{host}");
+        }
     }
 
     #[test]

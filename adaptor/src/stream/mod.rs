@@ -244,6 +244,7 @@ impl Server {
             credentials: Arc::clone(&credentials),
             refusals: Refusals::default(),
             is_loopback,
+            public: None,
             is_encrypted: identity.is_some(),
         };
         let shared = Shared {

@@ -4,7 +4,7 @@ use std::{
     net::IpAddr,
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
     },
 };
 
@@ -29,6 +29,8 @@ pub(super) struct Guest {
     pub(super) is_known: AtomicBool,
     /// It has become a WebSocket.
     pub(super) is_upgraded: AtomicBool,
+    /// Requests of it that the server has not answered yet.
+    pub(super) unanswered: AtomicUsize,
     /// It is to end, to make way for another.
     pub(super) is_cut: AtomicBool,
     /// Woken when it is cut.
@@ -69,6 +71,7 @@ impl Pool {
             address,
             is_known: AtomicBool::new(false),
             is_upgraded: AtomicBool::new(false),
+            unanswered: AtomicUsize::new(0),
             is_cut: AtomicBool::new(false),
             waker: AtomicWaker::new(),
         });

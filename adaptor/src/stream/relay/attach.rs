@@ -14,7 +14,10 @@ use axum::{
 };
 use tokio::time::timeout;
 
-use super::{RelayState, runs::RUNS};
+use super::{
+    RelayState,
+    runs::{Carried, RUNS},
+};
 use crate::stream::{
     PING_PERIOD,
     connection::Connection,
@@ -85,7 +88,7 @@ async fn keep(
     let attached = Attached {
         address: format!("{}/{}/", relay.base(host), run.run.name),
         name: run.run.name.clone(),
-        sha256: relay.fingerprint.clone(),
+        sha256: relay.fingerprint_in_links().map(str::to_owned),
     };
     let mut ping = tokio::time::interval(PING_PERIOD);
     let mut message = text(&attached);
@@ -148,9 +151,9 @@ pub(super) async fn carry(
     };
     let upgrade = hyper::upgrade::on(&mut request);
     tokio::spawn(async move {
-        if let Ok(upgraded) = upgrade.await {
+        if let Ok(stream) = upgrade.await {
             connection.upgraded();
-            let _ = waiting.send(upgraded);
+            let _ = waiting.send(Carried { stream, asked: connection.asked() });
         }
     });
     let mut response = StatusCode::SWITCHING_PROTOCOLS.into_response();

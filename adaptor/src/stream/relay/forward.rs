@@ -15,16 +15,13 @@ use axum::{
     },
     response::{IntoResponse, Response},
 };
-use hyper::{
-    client::conn::http1,
-    upgrade::{OnUpgrade, Upgraded},
-};
+use hyper::{client::conn::http1, upgrade::OnUpgrade};
 use hyper_util::rt::TokioIo;
 use tokio::time::timeout;
 
 use super::{
     RelayState,
-    runs::{Room, Unreached},
+    runs::{Carried, Room, Unreached},
 };
 use crate::stream::{connection::Connection, credentials::Access, relay_messages::ACCESS};
 
@@ -59,13 +56,14 @@ pub(super) async fn forward(
     };
     let Some(rest) = rest else {
         let query = request.uri().query().map_or_else(String::new, |query| format!("?{query}"));
-        let place = [(header::LOCATION, format!("/{}/{query}", run.name))];
+        // Relative, so that it holds behind a proxy's prefix too.
+        let place = [(header::LOCATION, format!("{}/{query}", run.name))];
         return (StatusCode::PERMANENT_REDIRECT, place).into_response();
     };
     let Ok(rest) = rest.parse::<PathAndQuery>() else {
         return said(StatusCode::BAD_REQUEST, "this path cannot be read\n");
     };
-    let (stream, room) = match relay.runs.dial(&run, connection.address()).await {
+    let (carried, room) = match relay.runs.dial(&run, connection.address()).await {
         Ok(connected) => connected,
         Err(Unreached::TooMany) => {
             return said(
@@ -78,7 +76,7 @@ pub(super) async fn forward(
         }
     };
     let request = passed_on(request, rest, &relay);
-    match timeout(ANSWER, exchange(stream, request, room, &connection)).await {
+    match timeout(ANSWER, exchange(carried, request, room, &connection)).await {
         Ok(Ok(response)) => response,
         Ok(Err(_)) => said(StatusCode::BAD_GATEWAY, "the run has ended this connection\n"),
         Err(_) => said(StatusCode::GATEWAY_TIMEOUT, "the run does not answer\n"),
@@ -143,7 +141,7 @@ fn without_those_of_connection(headers: &mut HeaderMap) {
 
 /// Sends a request to a run; its room is taken until all of the answer has gone through.
 async fn exchange(
-    stream: Upgraded,
+    Carried { stream, asked }: Carried,
     mut request: Request,
     room: Room,
     viewer: &Connection,
@@ -157,6 +155,7 @@ async fn exchange(
         let _ = connection.with_upgrades().await;
     });
     let mut response = sender.send_request(request).await?;
+    drop(asked);
     if let Some(access) = response.headers_mut().remove(ACCESS) {
         let is_driver = access.as_bytes() == Access::Drive.name().as_bytes();
         viewer.known(if is_driver { Access::Drive } else { Access::Watch });

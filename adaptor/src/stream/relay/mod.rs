@@ -144,6 +144,11 @@ impl RelayState {
         let scheme = if self.gate.is_encrypted { "https" } else { "http" };
         self.public.clone().unwrap_or_else(|| format!("{scheme}://{host}"))
     }
+
+    /// The fingerprint in the links of viewers. Behind a public address there may be another certificate.
+    fn fingerprint_in_links(&self) -> Option<&str> {
+        self.fingerprint.as_deref().filter(|_| self.public.is_none())
+    }
 }
 
 impl Relay {
@@ -177,15 +182,12 @@ impl Relay {
                 credentials: Arc::clone(&credentials),
                 refusals: gate::Refusals::default(),
                 is_loopback: !is_open,
+                public: settings.public.as_deref().and_then(host_of).map(str::to_owned),
                 is_encrypted: identity.is_some(),
             },
             credentials,
             runs: Runs::new(settings.connections.get() as usize),
-            // Behind another address it may be another certificate.
-            fingerprint: identity
-                .as_ref()
-                .filter(|_| settings.public.is_none())
-                .map(|identity| identity.fingerprint.clone()),
+            fingerprint: identity.as_ref().map(|identity| identity.fingerprint.clone()),
             public: settings.public.as_ref().map(|base| base.trim_end_matches('/').to_owned()),
         });
         // Each viewer takes one connection here and one of its run.
@@ -278,7 +280,7 @@ impl Relay {
 
     fn link_with(&self, name: &str, secret: &str) -> String {
         let base = self.state.base(&authority(self.address));
-        format!("{base}/?{name}={secret}{}", fragment(self.state.fingerprint.as_deref()))
+        format!("{base}/?{name}={secret}{}", fragment(self.state.fingerprint_in_links()))
     }
 }
 
@@ -313,6 +315,7 @@ async fn guard(
     mut request: Request,
     next: Next,
 ) -> Response {
+    let _asked = connection.asked();
     let path = request.uri().path();
     let is_own = path == "/" || path.starts_with("/-/");
     let refused = if is_own {
@@ -330,6 +333,12 @@ async fn guard(
         gate::add_headers(&mut response);
     }
     response
+}
+
+/// The host of an address such as `https://portal.example.org/tombolo`.
+fn host_of(address: &str) -> Option<&str> {
+    let (_, rest) = address.split_once("://")?;
+    rest.split('/').next().map(gate::without_port)
 }
 
 /// A directory that nobody else gets into, if it is not there yet.

@@ -16,7 +16,7 @@ use tombolo_pipelines::language::RunName;
 
 use crate::{
     lock::lock,
-    stream::{relay_messages::Open, secret::Secret},
+    stream::{connection::Asked, relay_messages::Open, secret::Secret},
 };
 
 /// Runs at once.
@@ -48,6 +48,13 @@ pub(super) enum Unreached {
     NoAnswer,
 }
 
+/// A connection that a run has made for a viewer.
+pub(super) struct Carried {
+    pub(super) stream: Upgraded,
+    /// The run is asked by it, and may take its time.
+    pub(super) asked: Asked,
+}
+
 /// Room for one connection of a viewer, taken as long as it lives.
 #[derive(Debug)]
 pub(super) struct Room {
@@ -66,7 +73,7 @@ pub(super) struct Runs {
 struct State {
     runs: BTreeMap<RunName, Arc<Run>>,
     /// By its ticket, who waits for a connection.
-    waiting: HashMap<String, oneshot::Sender<Upgraded>>,
+    waiting: HashMap<String, oneshot::Sender<Carried>>,
 }
 
 impl Runs {
@@ -127,7 +134,7 @@ impl Runs {
         &self,
         run: &Run,
         viewer: IpAddr,
-    ) -> Result<(Upgraded, Room), Unreached> {
+    ) -> Result<(Carried, Room), Unreached> {
         let take = |room: &Arc<Semaphore>| {
             Arc::clone(room).try_acquire_owned().map_err(|_| Unreached::TooMany)
         };
@@ -148,7 +155,7 @@ impl Runs {
     }
 
     /// Who waits for the connection of a ticket, which is used up.
-    pub(super) fn redeem(&self, ticket: &str) -> Option<oneshot::Sender<Upgraded>> {
+    pub(super) fn redeem(&self, ticket: &str) -> Option<oneshot::Sender<Carried>> {
         lock(&self.state).waiting.remove(ticket)
     }
 }
