@@ -16,7 +16,8 @@
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
 //! cargo run --release -p tombolo-benchmarks -- python --json
 //! cargo run --release -p tombolo-benchmarks -- service --json
-//! cargo run --release -p tombolo-benchmarks --features distributed -- volume --json
+//! cargo run --release -p tombolo-benchmarks -- volume --json
+//! cargo run --release -p tombolo-benchmarks --features distributed -- volume-ranks --json
 //! ```
 
 mod catalyst;
@@ -71,7 +72,7 @@ struct Arguments {
     /// Be the viewers of `service`, with this task.
     #[arg(long, hide = true)]
     viewers: Option<String>,
-    /// Be one of the ranks that `volume` starts for this mesh.
+    /// Be one of the ranks that `volume-ranks` starts for this mesh.
     #[cfg(feature = "distributed")]
     #[arg(long, hide = true, requires = "displacement")]
     part_of: Option<usize>,
@@ -106,6 +107,9 @@ enum Name {
     Untangle,
     /// Volume motion at the sizes of the paper's meshes, beside the paper and PETSc.
     Volume,
+    /// Volume motion of the same meshes on ranks of MPI, by the kernel and by PETSc.
+    #[cfg(feature = "distributed")]
+    VolumeRanks,
     /// Extracts and derived fields, beside VTK's filters.
     Extract,
     /// The viewer in a browser, watching a run: its pictures, its previews, its memory.
@@ -122,7 +126,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     #[cfg(feature = "distributed")]
     if let (Some(number), Some(displacement)) = (arguments.part_of, &arguments.displacement) {
-        return said(volume_ranks::run(number, displacement).map(|()| String::new()));
+        return said(volume_ranks::part(number, displacement).map(|()| String::new()));
     }
     if let Some(cubes) = arguments.cubes {
         return said(growth::one(cubes, arguments.busy).map(|()| String::new()));
@@ -143,6 +147,8 @@ fn main() -> ExitCode {
         Name::Codec => text(codec::run(), json),
         Name::Skeleton => text(skeleton::run(), json),
         Name::Volume => text(volume::run(), json),
+        #[cfg(feature = "distributed")]
+        Name::VolumeRanks => text(volume_ranks::run(), json),
         Name::Python => text(python::run(), json),
         Name::Service => text(service::run(arguments.short), json),
         Name::Growth => text(growth::run(), json),

@@ -21,14 +21,14 @@ use tombolo_tests::project;
 use crate::measure::{Times, memory_peak, processor_seconds};
 use crate::peer::{self, apart};
 use crate::report::{Report, Row, Target};
-use crate::volume_case::{THREADS, TOLERANCE, jiggled_box, mesh, motion};
+use crate::volume_case::{MESHES, THREADS, TOLERANCE, jiggled_box, mesh, motion};
 
 /// Runs of each of our own measurements.
 const RUNS: usize = 5;
 
 /// The paper's table: elements, processes, milliseconds to allocate and assemble the matrix and to
 /// solve.
-const PAPER: [(&str, usize, f64, f64); 5] = [
+const PAPER: [(&str, usize, f64, f64); MESHES] = [
     ("mesh 0", 12, 40.0 + 441.0, 23.0),
     ("mesh 1", 24, 71.0 + 573.0, 22.0),
     ("mesh 2", 48, 154.0 + 943.0, 30.0),
@@ -103,8 +103,6 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         ));
         let ratio = ours.improvement / ours.later;
         report.targets.push(Target::at_most(case("improvement by a later order"), ratio, 1.0));
-        #[cfg(feature = "distributed")]
-        on_ranks(number, &case, folder.path(), &mut report)?;
         if number + 1 == PAPER.len() {
             let cold = ours.assembly + ours.set_up + ours.solve;
             report.targets.push(Target::at_most(case("elasticity, cold [s]"), cold, 2.0));
@@ -141,44 +139,6 @@ fn measured() -> Result<Report, Box<dyn Error>> {
         }
     }
     Ok(report)
-}
-
-/// PETSc on the ranks of MPI, with a part of the mesh each, beside the shared-memory solver.
-#[cfg(feature = "distributed")]
-fn on_ranks(
-    number: usize,
-    case: &dyn Fn(&str) -> String,
-    folder: &Path,
-    report: &mut Report,
-) -> Result<(), Box<dyn Error>> {
-    use crate::volume_ranks::{OnRanks, started, write_displacement};
-
-    let file = folder.join("displacement");
-    write_displacement(&file, number)?;
-    for ranks in [1, 2] {
-        let found = started(number, ranks, &file)?;
-        for OnRanks { solver, set_up, first, later, iterations, .. } in &found {
-            let on = format!("{solver}, parts on {ranks} rank(s)");
-            let stages = [
-                ("assembly and set-up".to_owned(), set_up),
-                (format!("first order, {iterations} iterations"), first),
-                ("later order".to_owned(), later),
-            ];
-            for (what, &seconds) in stages {
-                report.rows.push(Row::new(case(&format!("{on}, {what}")), seconds));
-            }
-        }
-        let worst = found.iter().map(|solver| solver.difference).fold(0.0, f64::max);
-        let on = case(&format!("{ranks} rank(s), difference from the shared-memory solver"));
-        report.targets.push(Target::at_most(on, worst, 1e-6));
-        let cold = |solver: &OnRanks| solver.set_up + solver.first;
-        let petsc = || found.iter().filter(|solver| solver.solver.starts_with("PETSc"));
-        let quickest = petsc().map(cold).fold(f64::INFINITY, f64::min);
-        let default = petsc().find(|solver| solver.is_default).map_or(f64::INFINITY, cold);
-        let on = case(&format!("{ranks} rank(s), PETSc as it is by default by its quickest"));
-        report.targets.push(Target::at_most(on, default / quickest, 1.0));
-    }
-    Ok(())
 }
 
 /// The seconds that elasticity took, and its equations.

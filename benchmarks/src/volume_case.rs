@@ -14,6 +14,9 @@ pub const TOLERANCE: f64 = 1e-6;
 /// The threads of everything measured, as many as PETSc has ranks.
 pub const THREADS: usize = 2;
 
+/// The paper's meshes, of [`mesh`].
+pub const MESHES: usize = 5;
+
 /// The paper's bypass where `scripts/meshes` has made it already (the largest takes it a quarter of
 /// an hour); else a box with as many tetrahedra, made in a moment.
 pub fn mesh(number: usize) -> Result<(String, Mesh), Box<dyn Error>> {
@@ -22,7 +25,7 @@ pub fn mesh(number: usize) -> Result<(String, Mesh), Box<dyn Error>> {
     if file.exists() {
         return Ok((name, files::read_mesh(&file)?.mesh));
     }
-    let counts = [22, 27, 34, 43, 60];
+    let counts: [usize; MESHES] = [22, 27, 34, 43, 60];
     Ok(("box".into(), jiggled_box(*counts.get(number).ok_or("the paper has five meshes")?)?))
 }
 

@@ -22,45 +22,91 @@ use tombolo::{
 
 use crate::measure::Times;
 use crate::peer;
-use crate::volume_case::{THREADS, TOLERANCE, mesh, motion};
+use crate::report::{Report, Row, Target};
+use crate::volume_case::{MESHES, THREADS, TOLERANCE, mesh, motion};
 
 const RUNS: usize = 3;
 
-/// The seconds that one solver took on a number of ranks.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct OnRanks {
-    pub solver: String,
-    pub is_default: bool,
-    /// Assembly and set-up.
-    pub set_up: f64,
-    pub first: f64,
-    pub later: f64,
-    pub iterations: usize,
-    /// The largest difference from the displacement on one process by the largest displacement,
-    /// both solved to the kernel's default tolerance.
-    pub difference: f64,
+/// Runs the benchmark: some ten minutes.
+///
+/// # Errors
+/// The first error of a part; nothing is skipped.
+pub fn run() -> Result<Report, Box<dyn Error>> {
+    let mut report = Report { rows: Vec::new(), targets: Vec::new() };
+    for number in 0..MESHES {
+        let folder = tempfile::tempdir()?;
+        let file = folder.path().join("displacement");
+        let name = write_displacement(&file, number)?;
+        for ranks in [1, 2] {
+            let case = |what: &str| format!("{name}, {ranks} rank(s), {what}");
+            let found = started(number, ranks, &file)?;
+            for OnRanks { solver, set_up, first, later, iterations, .. } in &found {
+                let stages = [
+                    ("assembly and set-up".to_owned(), set_up),
+                    (format!("first order, {iterations} iterations"), first),
+                    ("later order".to_owned(), later),
+                ];
+                for (what, &seconds) in stages {
+                    report.rows.push(Row::new(case(&format!("{solver}, {what}")), seconds));
+                }
+            }
+            let worst = found.iter().map(|solver| solver.difference).fold(0.0, f64::max);
+            report.targets.push(Target::at_most(
+                case("difference from the shared-memory solver"),
+                worst,
+                1e-6,
+            ));
+            let cold = |solver: &OnRanks| solver.set_up + solver.first;
+            let petsc = || found.iter().filter(|solver| solver.solver.starts_with("PETSc"));
+            let quickest = petsc().map(cold).fold(f64::INFINITY, f64::min);
+            let default = petsc().find(|solver| solver.is_default).map_or(f64::INFINITY, cold);
+            report.targets.push(Target::at_most(
+                case("PETSc as it is by default by its quickest"),
+                default / quickest,
+                1.0,
+            ));
+        }
+    }
+    Ok(report)
 }
 
-/// The displacement on one process, for ranks to compare theirs with, in a file.
-pub fn write_displacement(file: &Path, number: usize) -> Result<(), Box<dyn Error>> {
-    let (_, mesh) = mesh(number)?;
+/// The seconds that one solver took on a number of ranks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct OnRanks {
+    solver: String,
+    is_default: bool,
+    /// Assembly and set-up.
+    set_up: f64,
+    first: f64,
+    later: f64,
+    iterations: usize,
+    /// The largest difference from the displacement on one process by the largest displacement,
+    /// both solved to the kernel's default tolerance.
+    difference: f64,
+}
+
+/// Writes the displacement on one process, for ranks to compare theirs with, and says which mesh
+/// it is of.
+fn write_displacement(file: &Path, number: usize) -> Result<String, Box<dyn Error>> {
+    let (source, mesh) = mesh(number)?;
     let surface = tombolo::deform::surface::Surface::extract(&mesh, &FeatureSettings::default())?;
     let operator = VolumeOperator::new(&mesh, surface.vertices(), &Deform::default())?;
     let displacement = operator.solve(&motion(&mesh, surface.vertices()))?.displacement;
     let bytes: Vec<u8> =
         displacement.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
-    Ok(std::fs::write(file, bytes)?)
+    std::fs::write(file, bytes)?;
+    Ok(format!("mesh {number} ({source}, {} tets)", mesh.cells().len()))
 }
 
 /// Runs the solvers on `ranks` ranks of MPI.
-pub fn started(
+fn started(
     number: usize,
     ranks: usize,
     displacement: &Path,
 ) -> Result<Vec<OnRanks>, Box<dyn Error>> {
     let mut command = peer::on_ranks(ranks);
     command.arg(std::env::current_exe()?).args([
-        "volume",
+        "volume-ranks",
         "--part-of",
         &number.to_string(),
         "--displacement",
@@ -69,8 +115,8 @@ pub fn started(
     Ok(serde_json::from_str(peer::answer(&printed)?)?)
 }
 
-/// The part of each rank.
-pub fn run(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
+/// Measures as one of the ranks that [`started`] starts.
+pub fn part(number: usize, displacement: &Path) -> Result<(), Box<dyn Error>> {
     let universe = rsmpi::initialize().ok_or("MPI was initialized before")?;
     let world = universe.world();
     let communicator: Arc<dyn Communicator> = Arc::new(Mpi::new(&world)?);
