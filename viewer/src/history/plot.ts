@@ -2,8 +2,8 @@
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
-import { digits, within } from "../number";
-import { COLOURS, axesOf, padded } from "./plotting";
+import { digits } from "../number";
+import { COLOURS, axesOf, labelled, padded } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
@@ -148,7 +148,7 @@ export class HistoryPlot implements Tab {
         ...scales.slice(0, AXES).map((scale, i) => ({
           ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: 58, grid: i === 0 ? grid : { show: false },
           stroke: scales.length === 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
-          values: (_: uPlot, ticks: number[]) => ticks.map((tick) => within(tick, [ticks[0] ?? 0, ticks.at(-1) ?? 1])),
+          values: labelled,
         })),
       ],
       hooks: {
