@@ -55,29 +55,60 @@ struct Four {
     /// The gradient of the determinant by the vertex.
     normal: [Lanes; 3],
     factor: Lanes,
-    /// The factors of each corner's product of squared edges that do not depend on the vertex, the
-    /// vertex's own corner first; infinite for corners that do not count.
-    products: [Lanes; 4],
+    /// The part of each corner's product of edges that does not depend on the vertex, the vertex's
+    /// own corner first; infinite for corners that do not count.
+    roots: [Lanes; 4],
 }
 
 /// The simplices around a vertex, as it sees them.
 #[derive(Debug, Default)]
 pub(super) struct Star {
     fours: Vec<Four>,
-    simplices: usize,
+}
+
+/// Four simplices where the vertex is at a point.
+struct Seen {
+    /// The edges from the others to the vertex, and their squared lengths.
+    edges: [[Lanes; 3]; 3],
+    squares: [Lanes; 3],
+    determinant: Lanes,
+    /// The determinant by that of a corner at right angles: a corner's quality times the product of
+    /// its edges.
+    scaled: Lanes,
+    /// The product of the edges at each corner; of no meaning at those that do not count.
+    roots: [Lanes; 4],
 }
 
 impl Four {
+    /// No simplex: a corner counts once it is given its part of the product.
     const NONE: Self = Self {
         others: [[Lanes::ZERO; 3]; 3],
         normal: [Lanes::ZERO; 3],
         factor: Lanes::ZERO,
-        products: [Lanes::all(f64::INFINITY); 4],
+        roots: [Lanes::all(f64::INFINITY); 4],
     };
 
-    /// The edges from the others to the vertex, and their squared lengths.
+    /// Finds what does not depend on the vertex, from the others' coordinates. Roots are 0 or
+    /// infinite before.
     #[inline(always)]
-    fn edges(&self, point: [Lanes; 3]) -> ([[Lanes; 3]; 3], [Lanes; 3]) {
+    fn complete(&mut self) {
+        let [a, b, c] = self.others;
+        let edge = |p: [Lanes; 3], q: [Lanes; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+        let [x, y] = [edge(c, a), edge(b, a)];
+        for axis in 0..3 {
+            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+            self.normal[axis] = x[next] * y[last] - x[last] * y[next];
+        }
+        let length = |[x, y, z]: [Lanes; 3]| (x * x + y * y + z * z).sqrt();
+        let (ab, ac, bc) = (length(y), length(x), length(edge(c, b)));
+        let products = [Lanes::all(1.0), ab * ac, ab * bc, ac * bc];
+        for (root, product) in self.roots.iter_mut().zip(products) {
+            *root += product;
+        }
+    }
+
+    #[inline(always)]
+    fn seen_from(&self, point: [Lanes; 3]) -> Seen {
         let mut edges = [[Lanes::ZERO; 3]; 3];
         let mut squares = [Lanes::ZERO; 3];
         for other in 0..3 {
@@ -87,79 +118,91 @@ impl Four {
             let [x, y, z] = edges[other];
             squares[other] = x * x + y * y + z * z;
         }
-        (edges, squares)
-    }
-
-    /// The determinants and, from them, the quality at each corner; 0 at corners that do not count.
-    #[inline(always)]
-    fn qualities(&self, edges: &[[Lanes; 3]; 3], squares: &[Lanes; 3]) -> (Lanes, [Lanes; 4]) {
         let [x, y, z] = edges[0];
         let determinant = self.normal[0] * x + self.normal[1] * y + self.normal[2] * z;
-        let own = [squares[0] * squares[1] * squares[2], squares[0], squares[1], squares[2]];
-        let scaled = self.factor * determinant;
-        let mut qualities = [Lanes::ZERO; 4];
+        let [a, b, c] = squares.map(Lanes::sqrt);
+        let own = [a * b * c, a, b, c];
+        let mut roots = self.roots;
         for corner in 0..4 {
-            qualities[corner] = scaled / (own[corner] * self.products[corner]).sqrt();
+            roots[corner] *= own[corner];
         }
-        (determinant, qualities)
+        Seen { edges, squares, determinant, scaled: self.factor * determinant, roots }
+    }
+
+    /// Adds to the energy: the sum of the barriers, and the sum of `ln q`. Whether every corner is
+    /// above the barrier.
+    #[inline(always)]
+    fn add_energy(
+        &self,
+        seen: &Seen,
+        parts: [Lanes; 4],
+        above: [Lanes; 4],
+        sum: &mut Lanes,
+        logarithms: &mut f64,
+    ) -> bool {
+        let one = Lanes::all(1.0);
+        let (mut lowest, mut products) = (one, [[one; 2]; 2]);
+        for corner in 0..4 {
+            let counts = self.roots[corner];
+            *sum += (parts[corner] * parts[corner]).where_finite(counts, Lanes::ZERO);
+            lowest = lowest.least(above[corner].where_finite(counts, one));
+            products[corner / 2][0] *= seen.scaled.where_finite(counts, one);
+            products[corner / 2][1] *= seen.roots[corner].where_finite(counts, one);
+        }
+        let [first, second] = products.map(|[scaled, roots]| scaled / roots);
+        *logarithms += (first * second).product().ln();
+        lowest.all_above(0.0)
     }
 }
 
 impl Star {
-    pub(super) fn clear(&mut self) {
+    /// Makes it the star of a vertex: each simplex comes with the index of the vertex in it.
+    pub(super) fn gather<'a>(
+        &mut self,
+        simplices: impl IntoIterator<Item = (&'a Simplex, usize)>,
+        points: &[Vector],
+    ) {
         self.fours.clear();
-        self.simplices = 0;
-    }
-
-    /// Adds a simplex, of whose vertices `index` is the star's own.
-    pub(super) fn push(&mut self, simplex: &Simplex, index: usize, points: &[Vector]) {
-        let order = FIRST[index];
-        let others =
-            [order[1], order[2], order[3]].map(|local| points[simplex.vertices[local] as usize]);
-        let [a, b, c] = others;
-        let square = |p: Vector, q: Vector| {
-            let edge = subtract(p, q);
-            dot(edge, edge)
-        };
-        let (ab, ac, bc) = (square(a, b), square(a, c), square(b, c));
-        let products = [1.0, ab * ac, ab * bc, ac * bc];
-        let normal = cross(subtract(c, a), subtract(b, a));
-        let lane = self.simplices % LANES;
-        if lane == 0 {
-            self.fours.push(Four::NONE);
-        }
-        self.simplices += 1;
-        let Some(four) = self.fours.last_mut() else { return };
-        for axis in 0..3 {
-            for (lanes, other) in four.others.iter_mut().zip(&others) {
-                lanes[axis].0[lane] = other[axis];
+        for (count, (simplex, index)) in simplices.into_iter().enumerate() {
+            let lane = count % LANES;
+            if lane == 0 {
+                self.fours.push(Four::NONE);
             }
-            four.normal[axis].0[lane] = normal[axis];
-        }
-        four.factor.0[lane] = simplex.factor;
-        for ((local, product), lanes) in order.into_iter().zip(products).zip(&mut four.products) {
-            if simplex.whole || local == 0 {
-                lanes.0[lane] = product;
+            let Some(four) = self.fours.last_mut() else { return };
+            let order = FIRST[index];
+            for (lanes, local) in four.others.iter_mut().zip(&order[1..]) {
+                let point = points[simplex.vertices[*local] as usize];
+                for axis in 0..3 {
+                    lanes[axis].0[lane] = point[axis];
+                }
+            }
+            four.factor.0[lane] = simplex.factor;
+            for (root, local) in four.roots.iter_mut().zip(order) {
+                if simplex.whole || local == 0 {
+                    root.0[lane] = 0.0;
+                }
             }
         }
+        with_wide_registers(
+            #[inline(always)]
+            || self.fours.iter_mut().for_each(Four::complete),
+        );
     }
 
-    /// Whether every quality is at least `bound` where the vertex is at `point`.
+    /// Whether every quality is above `bound` where the vertex is at `point`.
     pub(super) fn is_above(&self, point: Vector, bound: f64) -> bool {
         with_wide_registers(
             #[inline(always)]
             || {
-                let point = point.map(Lanes::all);
+                let (point, bound) = (point.map(Lanes::all), Lanes::all(bound));
                 self.fours.iter().all(|four| {
-                    let (edges, squares) = four.edges(point);
-                    let (_, qualities) = four.qualities(&edges, &squares);
-                    let mut least = Lanes::all(f64::INFINITY);
+                    let seen = four.seen_from(point);
+                    let mut least = Lanes::all(1.0);
                     for corner in 0..4 {
-                        let infinite = Lanes::all(f64::INFINITY);
-                        least = least
-                            .least(qualities[corner].where_finite(four.products[corner], infinite));
+                        let above = seen.scaled - bound * seen.roots[corner];
+                        least = least.least(above.where_finite(four.roots[corner], least));
                     }
-                    least.all_above(bound)
+                    least.all_above(0.0)
                 })
             },
         )
@@ -175,74 +218,75 @@ pub(super) struct Barrier {
     pub(super) gap: f64,
 }
 
+/// The energy at a place, with its gradient and Hessian.
+pub(super) struct Derivatives {
+    pub(super) energy: f64,
+    pub(super) gradient: Vector,
+    pub(super) hessian: [Vector; 3],
+}
+
 impl Barrier {
     /// The energy; infinite where a corner is not above the barrier.
+    ///
+    /// With `s` the determinant of a corner and `r` the product of its edges, `q = s / r` and
+    /// `δ / (q - τ) = δ r / (s - τ r)`, which takes one division.
     pub(super) fn energy(&self, point: Vector, star: &Star) -> f64 {
         with_wide_registers(
             #[inline(always)]
             || {
                 let point = point.map(Lanes::all);
-                let (floor, gap, one) =
-                    (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::all(1.0));
+                let (floor, gap) = (Lanes::all(self.floor), Lanes::all(self.gap));
                 let (mut sum, mut logarithms) = (Lanes::ZERO, 0.0);
                 for four in &star.fours {
-                    let (edges, squares) = four.edges(point);
-                    let (_, qualities) = four.qualities(&edges, &squares);
-                    let mut product = one;
-                    let mut lowest = one;
+                    let seen = four.seen_from(point);
+                    let above = seen.roots.map(|root| seen.scaled - floor * root);
+                    let mut parts = [Lanes::ZERO; 4];
                     for corner in 0..4 {
-                        let counts = four.products[corner];
-                        let above = (qualities[corner] - floor).where_finite(counts, one);
-                        let part = gap / above;
-                        sum += (part * part).where_finite(counts, Lanes::ZERO);
-                        product *= qualities[corner].where_finite(counts, one);
-                        lowest = lowest.least(above);
+                        parts[corner] = gap * seen.roots[corner] / above[corner];
                     }
-                    if !lowest.all_above(0.0) {
+                    if !four.add_energy(&seen, parts, above, &mut sum, &mut logarithms) {
                         return f64::INFINITY;
                     }
-                    logarithms += product.product().ln();
                 }
-                let energy = sum.sum() - MEAN * logarithms;
-                if energy.is_nan() { f64::INFINITY } else { energy }
+                finite_or_infinite(sum.sum() - MEAN * logarithms)
             },
         )
     }
 
     /// A better place of a vertex, or its own where none is found.
     pub(super) fn improved(&self, point: Vector, star: &Star) -> Vector {
-        let (gradient, hessian) = self.derivatives(point, star);
+        let Derivatives { energy, gradient, hessian } = self.derivatives(point, star);
         let Some(direction) = newton(&gradient, &hessian) else { return point };
-        let energy = |length: f64| self.energy(add(point, scale(direction, length)), star);
-        searched(point, direction, dot(direction, gradient), energy)
+        let along = |length: f64| self.energy(add(point, scale(direction, length)), star);
+        searched(point, direction, energy, dot(direction, gradient), along)
     }
 
-    /// The energy's gradient and Hessian by the place of the vertex.
-    pub(super) fn derivatives(&self, point: Vector, star: &Star) -> (Vector, [Vector; 3]) {
+    /// The energy, and its gradient and Hessian by the place of the vertex.
+    pub(super) fn derivatives(&self, point: Vector, star: &Star) -> Derivatives {
         with_wide_registers(
             #[inline(always)]
             || {
                 let point = point.map(Lanes::all);
                 let (floor, gap, zero) =
                     (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::ZERO);
-                let (mean, two, six) = (Lanes::all(MEAN), Lanes::all(2.0), Lanes::all(6.0));
+                let (one, mean) = (Lanes::all(1.0), Lanes::all(MEAN));
+                let (two, six) = (Lanes::all(2.0), Lanes::all(6.0));
+                let (mut sum, mut logarithms, mut is_above) = (zero, 0.0, true);
                 let mut gradient = [zero; 3];
                 let mut hessian = [[zero; 3]; 3];
                 for four in &star.fours {
-                    let (edges, squares) = four.edges(point);
-                    let (determinant, qualities) = four.qualities(&edges, &squares);
-                    let mut normal = [zero; 3];
+                    let seen = four.seen_from(point);
                     let mut units = [[zero; 3]; 3];
-                    let mut inverse = [zero; 3];
+                    let inverse = seen.squares.map(|square| one / square);
                     for other in 0..3 {
-                        inverse[other] = Lanes::all(1.0) / squares[other];
                         for axis in 0..3 {
-                            units[other][axis] = edges[other][axis] * inverse[other];
+                            units[other][axis] = seen.edges[other][axis] * inverse[other];
                         }
                     }
-                    for axis in 0..3 {
-                        normal[axis] = four.normal[axis] / determinant;
-                    }
+                    let by_determinant = one / seen.determinant;
+                    let normal = four.normal.map(|part| part * by_determinant);
+                    let above = seen.roots.map(|root| seen.scaled - floor * root);
+                    let mut parts = [zero; 4];
                     for corner in 0..4 {
                         // The derivatives of -ln q.
                         let own = if corner == 0 { 0..3 } else { corner - 1..corner };
@@ -264,15 +308,14 @@ impl Barrier {
                                 }
                             }
                         }
-                        let quality = qualities[corner];
-                        let above = quality - floor;
-                        let part = gap / above;
-                        let barrier = part * part;
+                        let by_above = one / above[corner];
+                        parts[corner] = gap * seen.roots[corner] * by_above;
+                        let barrier = parts[corner] * parts[corner];
                         // The first and second derivative by q, times q and its square.
-                        let ratio = quality / above;
+                        let ratio = seen.scaled * by_above;
                         let first = zero - two * barrier * ratio - mean;
                         let second = six * barrier * ratio * ratio + mean;
-                        let counts = four.products[corner];
+                        let counts = four.roots[corner];
                         let outer = second + first;
                         for row in 0..3 {
                             gradient[row] -= (slope[row] * first).where_finite(counts, zero);
@@ -283,15 +326,22 @@ impl Barrier {
                             }
                         }
                     }
+                    is_above &= four.add_energy(&seen, parts, above, &mut sum, &mut logarithms);
                 }
                 let h = |row: usize, column: usize| hessian[row.max(column)][row.min(column)].sum();
-                (
-                    gradient.map(Lanes::sum),
-                    std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))),
-                )
+                let energy = sum.sum() - MEAN * logarithms;
+                Derivatives {
+                    energy: if is_above { finite_or_infinite(energy) } else { f64::INFINITY },
+                    gradient: gradient.map(Lanes::sum),
+                    hessian: std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))),
+                }
             },
         )
     }
+}
+
+fn finite_or_infinite(energy: f64) -> f64 {
+    if energy.is_nan() { f64::INFINITY } else { energy }
 }
 
 /// All steps that [`searched`] may try, and none.
@@ -304,14 +354,14 @@ pub(super) fn length(index: usize) -> f64 {
 
 /// The place along a direction where the energy, a function of the length, has fallen enough: where
 /// the direction itself is not too long but falls short, as it does near the barrier, it is doubled
-/// while that helps.
+/// while that helps. `before` and `slope` are the energy and its derivative at length 0.
 pub(super) fn searched(
     point: Vector,
     direction: Vector,
+    before: f64,
     slope: f64,
     mut energy: impl FnMut(f64) -> f64,
 ) -> Vector {
-    let before = energy(0.0);
     if !before.is_finite() {
         return point;
     }
@@ -378,6 +428,12 @@ pub(super) fn newton(gradient: &Vector, hessian: &[Vector; 3]) -> Option<Vector>
 mod tests {
     use super::*;
 
+    fn of(simplices: &[(Simplex, usize)], points: &[Vector]) -> Star {
+        let mut star = Star::default();
+        star.gather(simplices.iter().map(|(simplex, index)| (simplex, *index)), points);
+        star
+    }
+
     /// An octahedron's four tetrahedra and two of its corners, seen from a place near the middle.
     fn star() -> (Vector, Star) {
         let points = [
@@ -390,25 +446,24 @@ mod tests {
             [0.0, 0.0, -1.0],
         ];
         let simplex = |vertices, whole| Simplex { vertices, factor: 1.2, whole };
-        let mut star = Star::default();
-        for (vertices, index, whole) in [
+        let simplices = [
             ([0, 1, 2, 5], 0, true),
             ([2, 3, 0, 5], 2, true),
             ([4, 3, 5, 0], 3, true),
             ([4, 0, 5, 1], 1, true),
             ([0, 2, 1, 6], 0, false),
             ([2, 3, 6, 0], 3, false),
-        ] {
-            star.push(&simplex(vertices, whole), index, &points);
-        }
-        (points[0], star)
+        ]
+        .map(|(vertices, index, whole)| (simplex(vertices, whole), index));
+        (points[0], of(&simplices, &points))
     }
 
     #[test]
     fn derivatives_are_those_of_the_energy() {
         let (point, star) = star();
         let barrier = Barrier { floor: 0.2, gap: 0.1 };
-        let (gradient, hessian) = barrier.derivatives(point, &star);
+        let Derivatives { energy, gradient, hessian } = barrier.derivatives(point, &star);
+        assert!((energy - barrier.energy(point, &star)).abs() < 1e-13 * energy);
         for axis in 0..3 {
             let at = |step: f64| {
                 let mut moved = point;
@@ -421,7 +476,7 @@ mod tests {
                 "{slope} {}",
                 gradient[axis]
             );
-            let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).0);
+            let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).gradient);
             for row in 0..3 {
                 let bend = (after[row] - before[row]) / 2e-6;
                 assert!(
@@ -447,8 +502,7 @@ mod tests {
             let expected: f64 =
                 corners.iter().map(|q: &f64| (0.3 / (q - 0.1)).powi(2) - MEAN * q.ln()).sum();
             for index in 0..4 {
-                let mut star = Star::default();
-                star.push(&simplex, index, &points);
+                let star = of(&[(simplex, index)], &points);
                 assert!((barrier.energy(points[index], &star) - expected).abs() < 1e-13, "{index}");
                 assert!(
                     star.is_above(points[index], 0.999 * least)
@@ -456,11 +510,8 @@ mod tests {
                 );
             }
             assert_eq!(
-                Barrier { floor: least, ..barrier }.energy(points[0], &{
-                    let mut star = Star::default();
-                    star.push(&simplex, 0, &points);
-                    star
-                }),
+                Barrier { floor: least, ..barrier }
+                    .energy(points[0], &of(&[(simplex, 0)], &points)),
                 f64::INFINITY
             );
         }

@@ -8,7 +8,7 @@ use crate::communicator::Halo;
 use crate::mesh::Vector;
 use crate::parallel;
 use crate::vector::{add, dot, scale};
-use crate::volume::barrier::{Barrier, LENGTHS, Star, length, newton, searched};
+use crate::volume::barrier::{Barrier, Derivatives, LENGTHS, Star, length, newton, searched};
 use crate::volume::colours::Held;
 
 /// How many vertices are moved at a time.
@@ -93,7 +93,7 @@ impl<'a> Sweeps<'a> {
         for &(entry, vertex) in &vertices {
             let point = points[vertex as usize];
             self.gather(vertex, points, &mut star);
-            let (gradient, hessian) = barrier.derivatives(point, &star);
+            let Derivatives { gradient, hessian, .. } = barrier.derivatives(point, &star);
             let slope = &mut slopes[entry as usize];
             slope[0] = f64::from(u8::from(!star.is_above(point, self.improver.good)));
             slope[1..4].copy_from_slice(&gradient);
@@ -125,7 +125,8 @@ impl<'a> Sweeps<'a> {
             let along = |wanted: f64| {
                 energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)]
             };
-            let position = searched(points[vertex as usize], direction, slope, along);
+            let position =
+                searched(points[vertex as usize], direction, energies[0], slope, along);
             if position != points[vertex as usize] {
                 self.wake(vertex);
                 points[vertex as usize] = position;
@@ -143,10 +144,9 @@ impl<'a> Sweeps<'a> {
     }
 
     fn gather(&self, vertex: u32, points: &[Vector], star: &mut Star) {
-        star.clear();
-        for &code in self.improver.incident.of(vertex) {
-            let simplex = &self.improver.simplices[(code / 4) as usize];
-            star.push(simplex, (code % 4) as usize, points);
-        }
+        let simplices = self.improver.incident.of(vertex).iter().map(|&code| {
+            (&self.improver.simplices[(code / 4) as usize], (code % 4) as usize)
+        });
+        star.gather(simplices, points);
     }
 }
