@@ -266,9 +266,16 @@ mod tests {
             });
             copies.map(|(_, bytes)| bytes.len()).min().unwrap_or_default()
         };
+        // The editor of pipelines and what checks them come when one is opened.
+        let later = ["editor-", "language-", "check.worker-"];
+        let is_first = |name: &&str| {
+            let file = name.rsplit('/').next().unwrap_or(name);
+            !name.ends_with(".br")
+                && !name.ends_with(".gz")
+                && !later.iter().any(|lazy| file.starts_with(lazy))
+        };
         let names = EMBEDDED.iter().map(|(name, _)| *name);
-        let wire: usize =
-            names.filter(|name| !name.ends_with(".br") && !name.ends_with(".gz")).map(least).sum();
+        let wire: usize = names.filter(is_first).map(least).sum();
         assert!(wire <= 700_000, "{wire} bytes");
     }
 }

@@ -333,7 +333,9 @@ impl Barrier {
                 Derivatives {
                     energy: if is_above { finite_or_infinite(energy) } else { f64::INFINITY },
                     gradient: gradient.map(Lanes::sum),
-                    hessian: std::array::from_fn(|row| std::array::from_fn(|column| h(row, column))),
+                    hessian: std::array::from_fn(|row| {
+                        std::array::from_fn(|column| h(row, column))
+                    }),
                 }
             },
         )
@@ -476,7 +478,8 @@ mod tests {
                 "{slope} {}",
                 gradient[axis]
             );
-            let [after, before] = [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).gradient);
+            let [after, before] =
+                [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).gradient);
             for row in 0..3 {
                 let bend = (after[row] - before[row]) / 2e-6;
                 assert!(

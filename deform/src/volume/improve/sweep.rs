@@ -125,8 +125,7 @@ impl<'a> Sweeps<'a> {
             let along = |wanted: f64| {
                 energies[(0..=LENGTHS).find(|&index| length(index) == wanted).unwrap_or(0)]
             };
-            let position =
-                searched(points[vertex as usize], direction, energies[0], slope, along);
+            let position = searched(points[vertex as usize], direction, energies[0], slope, along);
             if position != points[vertex as usize] {
                 self.wake(vertex);
                 points[vertex as usize] = position;
@@ -144,9 +143,12 @@ impl<'a> Sweeps<'a> {
     }
 
     fn gather(&self, vertex: u32, points: &[Vector], star: &mut Star) {
-        let simplices = self.improver.incident.of(vertex).iter().map(|&code| {
-            (&self.improver.simplices[(code / 4) as usize], (code % 4) as usize)
-        });
+        let simplices = self
+            .improver
+            .incident
+            .of(vertex)
+            .iter()
+            .map(|&code| (&self.improver.simplices[(code / 4) as usize], (code % 4) as usize));
         star.gather(simplices, points);
     }
 }
