@@ -18,7 +18,7 @@ pub struct Beside<'a> {
     pub parameters: &'a [&'a str],
 }
 
-/// Reads and checks the text of a pipeline that a viewer would set, and tells every error.
+/// Reads and checks the text of a pipeline that a viewer would set, and reports every error.
 ///
 /// Each stage and action is read by itself, as [`check`](super::check()) does. Besides what is wrong in
 /// the pipeline itself, its errors are those that would refuse the change: a monitor, parameter or
@@ -36,8 +36,8 @@ pub struct Beside<'a> {
 /// ```
 ///
 /// # Errors
-/// [`LanguageErrors`] with their places in the text. What the pipeline does to another one stands at
-/// its beginning, with the name of that one.
+/// [`LanguageErrors`] with their places in the text. An error of another pipeline, which this one
+/// would cause, stands at the beginning of the text and names that pipeline.
 pub fn check_pipeline(
     text: &str,
     file: &str,
@@ -56,7 +56,7 @@ pub fn check_pipeline(
             }
             let found = match problem.of_pipeline() {
                 (Some(index), problem) if index == own => problem,
-                // What it lacks may be what that one needs.
+                // The part of the pipeline that could not be read may be the one that the other needs.
                 (Some(_), _) if piece.lacks => continue,
                 (Some(index), problem) => other(beside, index, &problem),
                 (None, problem) => problem,
@@ -72,7 +72,7 @@ pub fn check_pipeline(
 
 /// The problems of all pipelines as they would be, and the index of the one that is set.
 ///
-/// It comes last, so that of two that do not go together it is the one that is told of.
+/// It comes last, so that of two pipelines that do not go together it is the one that is reported.
 fn problems(
     read: Pipeline,
     lacks: bool,

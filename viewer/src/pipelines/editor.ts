@@ -146,10 +146,6 @@ export class PipelineEditor {
     this.view.focus();
   }
 
-  get hasFocus(): boolean {
-    return this.view.hasFocus;
-  }
-
   private complete(context: CompletionContext): CompletionResult | null {
     const text = context.state.doc.toString();
     const place = placeAt(text, context.pos);

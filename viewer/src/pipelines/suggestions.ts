@@ -7,7 +7,6 @@ export interface Suggestion {
   label: string;
   /** The JSON that is put in place of the token; `#` is where the cursor is then, at its end where there is none. */
   insert: string;
-  kind: "key" | "stage" | "value" | "field" | "feature" | "monitor" | "channel" | "parameter";
   /** A word or two beside it, such as "required". */
   detail: string;
   description: string;
@@ -137,7 +136,7 @@ function keysAt(root: Schema, { path, keys, hasColon }: Place): Suggestion[] {
       const value = start(root, given);
       const key = JSON.stringify(name);
       found.set(name, {
-        label: name, insert: hasColon ? `${key}#` : `${key}: ${value}`, kind: isOnly ? "stage" : "key",
+        label: name, insert: hasColon ? `${key}#` : `${key}: ${value}`,
         detail: !isOnly && required.includes(name) ? "required" : "", description: described,
       });
     }
@@ -147,28 +146,28 @@ function keysAt(root: Schema, { path, keys, hasColon }: Place): Suggestion[] {
 
 function valuesAt(root: Schema, { path }: Place, names: KnownNames): Suggestion[] {
   const found = new Map<string, Suggestion>();
-  const add = (label: string, insert: string, kind: Suggestion["kind"], detail = "", description = ""): void => {
-    if (!found.has(label)) found.set(label, { label, insert, kind, detail, description });
+  const add = (label: string, insert: string, detail = "", description = ""): void => {
+    if (!found.has(label)) found.set(label, { label, insert, detail, description });
   };
   const schemas = schemasAt(root, path);
   const takesText = schemas.some((schema) => has(schema, "string"));
   const kind = takesText ? nameKind(path) : null;
-  if (kind === "field") for (const { name, description } of names.fields) add(name, JSON.stringify(name), kind, "field", description);
+  if (kind === "field") for (const { name, description } of names.fields) add(name, JSON.stringify(name), kind, description);
   else if (kind !== null) {
     const all = { feature: names.features, monitor: names.monitors, channel: names.channels, parameter: names.parameters }[kind];
-    for (const name of all) add(name, JSON.stringify(name), kind, kind);
+    for (const name of all) add(name, JSON.stringify(name), kind);
   }
   for (const schema of schemas) {
     for (const value of [...(schema.const === undefined ? [] : [schema.const]), ...list(schema.enum)]) {
-      if (value !== null) add(typeof value === "string" ? value : JSON.stringify(value), JSON.stringify(value), "value", value === schema.default ? "default" : "", plain(schema.description));
+      if (value !== null) add(typeof value === "string" ? value : JSON.stringify(value), JSON.stringify(value), value === schema.default ? "default" : "", plain(schema.description));
     }
-    if (has(schema, "boolean")) for (const value of ["true", "false"]) add(value, value, "value", String(schema.default) === value ? "default" : "", plain(schema.description));
+    if (has(schema, "boolean")) for (const value of ["true", "false"]) add(value, value, String(schema.default) === value ? "default" : "", plain(schema.description));
     if (isObject(schema.properties)) {
       const required = list(schema.required);
       const [only, ...more] = Object.keys(schema.properties);
       // An object of one key, such as a stage: by the name of that key.
-      if (only !== undefined && more.length === 0 && required.length === 1) add(only, `{ ${JSON.stringify(only)}: ${start(root, schema.properties[only])} }`, "stage", "", plain(schema.description));
-      else add("{ }", start(root, schema), "value", "", plain(schema.description));
+      if (only !== undefined && more.length === 0 && required.length === 1) add(only, `{ ${JSON.stringify(only)}: ${start(root, schema.properties[only])} }`, "", plain(schema.description));
+      else add("{ }", start(root, schema), "", plain(schema.description));
     }
   }
   return [...found.values()];
@@ -176,8 +175,8 @@ function valuesAt(root: Schema, { path }: Place, names: KnownNames): Suggestion[
 
 /** The names that a formula at a path may hold, as they are written there. */
 export function formulaNames(path: Path, names: KnownNames): Suggestion[] {
-  const suggestion = (label: string, kind: Suggestion["kind"], description = ""): Suggestion =>
-    ({ label, insert: /^[A-Za-z_][\w.]*$/.test(label) ? label : `{${label}}`, kind, detail: kind, description });
+  const suggestion = (label: string, detail: NameKind, description = ""): Suggestion =>
+    ({ label, insert: /^[A-Za-z_][\w.]*$/.test(label) ? label : `{${label}}`, detail, description });
   if (nameKind(path) === "field") return names.fields.map(({ name, description }) => suggestion(name, "field", description));
   const given = [["cycle", "The number of the step."], ["time", "The simulated time."]].map(([name, text]) => suggestion(name!, "monitor", text));
   return [...names.monitors.map((name) => suggestion(name, "monitor")), ...names.parameters.map((name) => suggestion(`parameter.${name}`, "parameter")), ...given];

@@ -29,7 +29,7 @@ describe("what may be written", () => {
   it("are stages, whole where the list is and by name where one is begun", () => {
     expect(labels('{"stages": [|]}')).toEqual(expect.arrayContaining(["surface", "slice", "contour", "stream", "statistics"]));
     const stage = at('{"stages": [{"|"}]}').find(({ label }) => label === "slice");
-    expect(stage).toMatchObject({ kind: "stage", insert: '"slice": {#}', description: expect.stringMatching(/^Cuts the mesh with a plane/) });
+    expect(stage).toMatchObject({ insert: '"slice": {#}', description: expect.stringMatching(/^Cuts the mesh with a plane/) });
     // A stage has one key alone.
     expect(labels('{"stages": [{"slice": {}, "|"}]}')).toEqual([]);
     expect(at('{"stages": [|]}').find(({ label }) => label === "contour")).toMatchObject({ insert: '{ "contour": { "field": "#", "values": [] } }' });
