@@ -1,13 +1,13 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
 //! shaping by hand, a first day, pipelines changed, a shape changed by two people, several people together,
-//! and the end of a run.
+//! runs behind a relay and a proxy, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use serde_json::json;
-use tombolo_tests::{Run, Small, project};
+use serde_json::{Value, json};
+use tombolo_tests::{Proxy, Run, Small, driving, free_port, program, project};
 
 /// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
@@ -17,11 +17,17 @@ fn alone() -> MutexGuard<'static, ()> {
 
 /// Runs a script of `tests/browser` on a run, and panics with what both said where it fails.
 fn drive(script: &str, run: &mut Run) {
-    let link = run.link();
+    let url = run.link().url();
+    drive_at(script, &url, run, &[]);
+}
+
+/// Runs a script of `tests/browser` on the run at an address, with these variables besides.
+fn drive_at(script: &str, url: &str, run: &Run, variables: &[(&str, String)]) {
     let output = Command::new("node")
         .current_dir(project())
-        .env("TOMBOLO_URL", link.url())
+        .env("TOMBOLO_URL", url)
         .env("TOMBOLO_PID", run.process().to_string())
+        .envs(variables.iter().map(|(name, value)| (name, value)))
         .arg(Path::new("tests/browser").join(script))
         .output()
         .expect("node is installed (scripts/setup)");
@@ -120,4 +126,52 @@ fn the_end_of_a_run_in_a_browser() {
     let _alone = alone();
     let (_small, mut run) = small(&["--steps", "1500"]);
     drive("ended.mjs", &mut run);
+}
+
+/// The way of a site: the browser, a network that is cut for half a minute, a proxy with a certificate
+/// before a path, a relay, and three runs, of which nobody reaches any by itself.
+#[test]
+fn runs_behind_a_relay_and_a_proxy_in_a_browser() {
+    let _alone = alone();
+    let (relay_port, public_port) = (free_port(), free_port());
+    let proxy = Proxy::start("/tombolo/", relay_port);
+    let directory = tempfile::TempDir::new().expect("a temporary directory");
+    let mut relay = Run::start(
+        program("tombolo")
+            .args(["relay", "--listen", &format!("127.0.0.1:{relay_port}"), "--directory"])
+            .arg(directory.path())
+            .args(["--public", &format!("https://localhost:{public_port}/tombolo")]),
+    );
+    let stream = relay.line("how runs connect", |line| {
+        let (_, stream) = line.split_once("runs connect with \"stream\": ")?;
+        serde_json::from_str::<Value>(stream).ok()
+    });
+    let mut runs = ["nozzle", "pump", "wing"].map(|name| {
+        let small = Small::new();
+        let mut stream = stream.clone();
+        stream["name"] = name.into();
+        small.write(
+            "pipelines.json",
+            &json!({"version": 1, "stream": stream, "steering": {"wait_for_viewer": true},
+                    "pipelines": [
+                {"name": "surface", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
+                {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
+            ]}),
+        );
+        let arguments = ["--pipelines", "@pipelines.json", "--steps", "1000000"];
+        let run = Run::flow(&small.arguments(&arguments));
+        (small, run)
+    });
+    let links = runs.each_mut().map(|(_, run)| run.line("its link", driving));
+    let page = std::fs::read_to_string(directory.path().join("relay.link")).expect("its link");
+    let page = page.trim().strip_prefix("page: ").expect("a link").to_owned();
+    let variables = [
+        ("TOMBOLO_PAGE", page),
+        ("TOMBOLO_OTHER", links[1].clone()),
+        ("TOMBOLO_NETWORK", format!("{public_port} {}", proxy.port)),
+    ];
+    drive_at("relay.mjs", &links[0], &runs[0].1, &variables);
+    for (_, run) in &mut runs[1..] {
+        assert!(run.is_running(), "the run ended:\n{}", run.text());
+    }
 }

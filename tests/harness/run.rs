@@ -144,21 +144,29 @@ impl Run {
     /// Waits for the link to the viewer.
     ///
     /// # Panics
-    /// Where the program ends or a minute passes before it prints one.
+    /// Where the program ends or long passes before it prints one.
     pub fn link(&mut self) -> Link {
+        self.line("a link", Link::find)
+    }
+
+    /// Waits for a line in which `found` finds something.
+    ///
+    /// # Panics
+    /// Where the program ends or long passes before it prints one.
+    pub fn line<T>(&mut self, what: &str, found: impl Fn(&str) -> Option<T>) -> T {
         let until = Instant::now() + PATIENCE;
         loop {
             match self.lines.recv_timeout(until.saturating_duration_since(Instant::now())) {
                 Ok(line) => {
-                    if let Some(link) = Link::find(&line) {
-                        return link;
+                    if let Some(found) = found(&line) {
+                        return found;
                     }
                 }
                 Err(RecvTimeoutError::Timeout) => {
-                    panic!("flow printed no link in a minute:\n{}", self.text())
+                    panic!("{what} was not printed in {PATIENCE:?}:\n{}", self.text())
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    panic!("flow ended and printed no link:\n{}", self.text())
+                    panic!("the program ended and did not print {what}:\n{}", self.text())
                 }
             }
         }

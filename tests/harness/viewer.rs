@@ -24,9 +24,8 @@ impl Link {
     /// The link in a line of output, or in the file that the line names, if there is one.
     #[must_use]
     pub fn find(line: &str) -> Option<Link> {
-        if let Some((_, path)) = line.split_once("the links to this run are in ") {
-            let text = std::fs::read_to_string(crate::project().join(path)).ok()?;
-            return Link::find(text.lines().find(|line| line.starts_with("drive: "))?);
+        if let Some(url) = driving(line) {
+            return Link::find(&url);
         }
         let rest = &line[line.find("http://")? + "http://".len()..];
         let address = rest.split('/').next()?.to_owned();
@@ -57,6 +56,14 @@ impl Link {
         stream.set_read_timeout(Some(PATIENCE)).expect("a timeout can be set");
         stream
     }
+}
+
+/// The address for a browser that drives, from the file that a line of a run's output names.
+#[must_use]
+pub fn driving(line: &str) -> Option<String> {
+    let (_, path) = line.split_once("the links to this run are in ")?;
+    let text = std::fs::read_to_string(crate::project().join(path)).ok()?;
+    text.lines().find_map(|line| line.strip_prefix("drive: ")).map(str::to_owned)
 }
 
 /// A message of the server.

@@ -25,6 +25,8 @@ export interface Inspection {
   /** How the connection stands: connecting, connected, reconnecting, refused or ended. */
   readonly connection: ConnectionState;
   readonly role: Role | null;
+  /** The name of this viewer in the run; null before it has one. */
+  readonly client: string | null;
   /** The cycle of the newest frame; null before the first. */
   readonly cycle: number | null;
   /** Data frames taken since the page was opened. */

@@ -81,7 +81,7 @@ if (!document.createElement("canvas").getContext("webgl2")) {
 
 const kept = new Kept(window.localStorage);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
-const DRAFTS = "tombolo-drafts";
+const DRAFTS = `tombolo-drafts ${location.pathname}`;
 const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);
 store.watch((state) => state.pipelines.drafts, (drafts) => {
   try {
@@ -375,8 +375,8 @@ function takeFrame(frame: Frame): void {
   else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
-// A viewer that was here before comes back under its name.
-const CLIENT = "tombolo-client", BACK = "tombolo-back";
+// A viewer that was here before comes back under its name; the other runs of a relay know it by others.
+const CLIENT = `tombolo-client ${location.pathname}`, BACK = `tombolo-back ${location.pathname}`;
 const [client, back] = [sessionStorage.getItem(CLIENT), sessionStorage.getItem(BACK)];
 connection.identity = client !== null && back !== null ? { client, back } : null;
 store.watch((state) => state.hello, (hello) => {
@@ -453,6 +453,7 @@ part("skeleton").addEventListener("click", (event) => {
 publish({
   get connection() { return store.state.connection.state; },
   get role() { return store.state.hello?.role ?? null; },
+  get client() { return store.state.hello ? String(store.state.hello.client) : null; },
   get cycle() { return store.state.frames.cycle; },
   get frames() { return store.state.frames.count; },
   get views() {

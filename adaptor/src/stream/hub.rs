@@ -130,6 +130,7 @@ pub(super) struct HubState {
     pub(super) journal_lost: Option<String>,
     pub(super) last_status: Option<(u64, Instant)>,
     pub(super) status_dirty: bool,
+    pub(super) status_told: Option<Instant>,
     end: End,
     closed: bool,
 }

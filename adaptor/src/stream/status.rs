@@ -1,6 +1,6 @@
 //! How far a run is and what it costs, for viewers: the newest alone, a few times a second.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 use tombolo_pipelines::run::Cost;
@@ -11,8 +11,13 @@ use super::{
 };
 use crate::lock::lock;
 
+/// A status is told again after this long though nothing in it has changed: a page, which cannot see
+/// a server's pings, knows by it that it is still connected.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
+
 impl Hub {
-    /// Puts a status into every outbox if anything in it changed. Called a few times a second.
+    /// Puts a status into every outbox if anything in it changed, or none was told for ten seconds.
+    /// Called a few times a second.
     pub(crate) fn status(&self) {
         // The solver could wait for the lock: what is told is copied under it, and written later.
         let Some(status) = self.new_status() else { return };
@@ -20,7 +25,7 @@ impl Hub {
         lock(&self.state).audience().for_each(|client| client.status(&text));
     }
 
-    /// The status, where it has changed.
+    /// The status, where it is to be told.
     fn new_status(&self) -> Option<impl FnOnce() -> Map<String, Value> + Send + use<>> {
         let (cycle, time) = self.clock.get();
         let mut state = lock(&self.state);
@@ -30,10 +35,11 @@ impl Hub {
         }
         let now = Instant::now();
         let before = state.last_status;
-        if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty {
+        let is_late = state.status_told.is_none_or(|told| now.duration_since(told) >= SIGN_OF_LIFE);
+        if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty && !is_late {
             return None;
         }
-        state.status_dirty = false;
+        (state.status_dirty, state.status_told) = (false, Some(now));
         // Measured over the steps since the last status, so that the solver need not look at a
         // clock for it.
         let step_seconds = before.and_then(|(last, at)| {
@@ -61,5 +67,24 @@ impl Hub {
             status.insert("pipelines".into(), costs.iter().map(pipeline).collect());
             status
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{credentials::Access, hub::Arrival};
+
+    #[test]
+    fn a_status_is_told_again_where_none_was_told_for_long() {
+        let hub = Hub::default();
+        let Ok(Arrival::Client(_viewer)) = hub.join(1, Access::Watch, None) else {
+            panic!("there is room for a viewer")
+        };
+        assert!(hub.new_status().is_some());
+        assert!(hub.new_status().is_none());
+        lock(&hub.state).status_told = Instant::now().checked_sub(SIGN_OF_LIFE);
+        assert!(hub.new_status().is_some());
+        assert!(hub.new_status().is_none());
     }
 }

@@ -28,6 +28,9 @@ const FIRST_DELAY = 250;
 const LONGEST_DELAY = 8000;
 const REFUSED_DELAY = 5000;
 
+/** A connection on which nothing comes for this long is lost: the server tells a status every ten seconds at least. */
+export const SILENCE = 25000;
+
 /** Milliseconds to wait before attempt number `attempt` (from 0): doubling, bounded, spread by up to a quarter. */
 export function backOff(attempt: number, random: number): number {
   const base = Math.min(LONGEST_DELAY, FIRST_DELAY * 2 ** Math.min(attempt, 16));
@@ -72,6 +75,8 @@ export class Connection {
   private socket: WebSocket | null = null;
   private attempt = 0;
   private timer: number | null = null;
+  /** Runs out when nothing was heard for too long. */
+  private patience: number | null = null;
   private closed = false;
   state: ConnectionState = "connecting";
   /** Who this viewer is: shown when it comes back, so that it finds the wheel where it left it. */
@@ -92,8 +97,7 @@ export class Connection {
   stop(): void {
     this.closed = true;
     this.clearTimer();
-    this.socket?.close();
-    this.socket = null;
+    this.letGo();
     this.change("ended", "");
   }
 
@@ -119,11 +123,28 @@ export class Connection {
 
   /** Gives the connection up and opens another. */
   renew(reason: string): void {
-    const socket = this.socket;
-    if (!socket) return;
-    this.socket = null;
-    socket.close();
+    if (!this.socket) return;
+    this.letGo();
     this.again("reconnecting", reason, backOff(this.attempt++, this.surroundings.random()));
+  }
+
+  /** Closes the socket; what still comes of it is not heard. */
+  private letGo(): void {
+    const { socket } = this;
+    this.socket = null;
+    this.stopListening();
+    socket?.close();
+  }
+
+  /** Begins to wait for the next sign of life. */
+  private listen(): void {
+    this.stopListening();
+    this.patience = this.surroundings.setTimer(() => this.renew(`Nothing was heard for ${SILENCE / 1000} seconds.`), SILENCE);
+  }
+
+  private stopListening(): void {
+    if (this.patience !== null) this.surroundings.clearTimer(this.patience);
+    this.patience = null;
   }
 
   private change(state: ConnectionState, explanation: string): void {
@@ -142,12 +163,15 @@ export class Connection {
     }
     socket.binaryType = "arraybuffer";
     this.socket = socket;
+    this.listen();
     let opened = false;
     socket.onopen = () => {
       opened = true;
       this.change("connected", "");
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => {
+      if (this.socket !== socket) return;
+      this.listen();
       if (typeof event.data !== "string") {
         this.listener.binary(event.data);
         return;
@@ -157,8 +181,7 @@ export class Connection {
         message = parseServerMessage(event.data);
       } catch (error) {
         if (error instanceof VersionError) {
-          this.socket = null;
-          socket.close();
+          this.letGo();
           const older = typeof error.found === "number" && error.found < PROTOCOL_VERSION;
           return this.change("dismissed", `This page and the simulation do not understand each other: ${error.message}. `
             + (older ? "The simulation is older than this page: open the page that it serves itself." : "Reload the page to get the one that belongs to the simulation."));
@@ -172,7 +195,7 @@ export class Connection {
     };
     socket.onclose = (event: CloseEvent) => {
       if (this.socket !== socket) return;
-      this.socket = null;
+      this.letGo();
       if (this.closed) return;
       // The server's farewell: there is nothing to come back to.
       if (event.code === ENDED) return this.change("ended", "");

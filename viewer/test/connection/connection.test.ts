@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Connection, backOff, streamAddress } from "../../src/connection/connection";
+import { Connection, SILENCE, backOff, streamAddress } from "../../src/connection/connection";
 import type { ConnectionState, Surroundings } from "../../src/connection/connection";
 
 class FakeSocket {
@@ -18,6 +18,8 @@ class FakeSocket {
 function setUp(status: number | null = null) {
   const sockets: FakeSocket[] = [];
   const timers: { action: () => void; delay: number }[] = [];
+  /** What runs out when nothing is heard; null where that is not waited for. */
+  let silence: (() => void) | null = null;
   const states: [ConnectionState, string][] = [];
   const messages: unknown[] = [];
   const troubles: string[] = [];
@@ -30,8 +32,12 @@ function setUp(status: number | null = null) {
       return socket as unknown as WebSocket;
     },
     probe: async () => (status === null ? null : { status, text: "no" }),
-    setTimer: (action, delay) => timers.push({ action, delay }),
-    clearTimer: () => undefined,
+    setTimer: (action, delay) => {
+      if (delay < SILENCE) return timers.push({ action, delay });
+      silence = action;
+      return -1;
+    },
+    clearTimer: (timer) => { if (timer === -1) silence = null; },
     random: () => 0.5,
   };
   const connection = new Connection({ address: "ws://x/ws", probe: "http://x/ws" }, {
@@ -39,7 +45,7 @@ function setUp(status: number | null = null) {
     message: (message) => messages.push(message), binary: (bytes) => messages.push(bytes.byteLength), trouble: (text) => troubles.push(text),
   }, surroundings);
   connection.start();
-  return { connection, addresses, sockets, timers, states, messages, troubles };
+  return { connection, addresses, sockets, timers, states, messages, troubles, silence: () => silence };
 }
 const settle = (): Promise<void> => new Promise((resolve) => setTimeout(resolve, 0));
 
@@ -93,6 +99,34 @@ describe("a connection", () => {
     sockets[0]!.end(1013, "16 viewers watch already");
     await settle();
     expect(states.at(-1)).toEqual(["reconnecting", "The simulation closed the connection: 16 viewers watch already."]);
+  });
+
+  it("takes a connection on which nothing comes for lost, and makes another", () => {
+    const { addresses, sockets, timers, states, messages, silence } = setUp();
+    sockets[0]!.open();
+    const first = silence();
+    sockets[0]!.onmessage?.({ data: new ArrayBuffer(3) });
+    expect(silence()).not.toBe(first);
+    silence()!();
+    expect(states.at(-1)).toEqual(["reconnecting", "Nothing was heard for 25 seconds."]);
+    expect([sockets[0]!.readyState, silence()]).toEqual([3, null]);
+    timers[0]!.action();
+    expect([addresses.length, timers.length]).toEqual([2, 1]);
+    // What was on its way on the old one is not heard.
+    sockets[0]!.onmessage?.({ data: new ArrayBuffer(4) });
+    expect(messages).toEqual([3]);
+    // Nor is an answer waited for that never comes.
+    silence()!();
+    expect(states.at(-1)![0]).toBe("reconnecting");
+    expect(timers).toHaveLength(2);
+  });
+
+  it("waits for no sign of life where it has ended", async () => {
+    const { connection, sockets, silence } = setUp();
+    sockets[0]!.open();
+    connection.stop();
+    await settle();
+    expect(silence()).toBeNull();
   });
 
   it("says who it was when it comes back", async () => {

@@ -298,6 +298,7 @@ impl Drop for Relay {
 fn router(state: Arc<RelayState>) -> Router {
     Router::new()
         .route("/", get(page::page))
+        .route("/-/page.js", get(page::script))
         .route("/-/runs", get(page::list))
         .route(ATTACH, get(attach::attach))
         .route(&format!("{}{{ticket}}", CARRY), get(attach::carry))

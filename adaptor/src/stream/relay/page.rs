@@ -4,20 +4,35 @@ use std::{fmt::Write, sync::Arc, time::SystemTime};
 
 use axum::{
     extract::State,
+    http::header::CONTENT_TYPE,
     response::{Html, IntoResponse, Response},
 };
 use serde_json::json;
 
 use super::RelayState;
 
-const HEAD: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"5\">\
+const HEAD: &str = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\">\
 <meta name=\"viewport\" content=\"width=device-width\"><title>Tombolo: runs</title>\
-<style>body{font:16px/1.5 system-ui,sans-serif;max-width:44rem;margin:3rem auto;padding:0 1rem;color:#1c2733}\
-table{border-collapse:collapse;width:100%}td,th{text-align:left;padding:.4rem .8rem .4rem 0;border-bottom:1px solid #d5dce3}</style>\
-<body><h1>Runs</h1>";
+<style>:root{color-scheme:light dark}body{font:16px/1.5 system-ui,sans-serif;max-width:44rem;margin:3rem auto;padding:0 1rem}\
+table{border-collapse:collapse;width:100%}td,th{text-align:left;padding:.4rem .8rem .4rem 0;border-bottom:1px solid #8886}</style>\
+<script src=\"-/page.js\" defer></script><body><main><h1>Runs</h1><div id=\"runs\">";
 const NONE: &str = "<p>No run is connected to this relay.</p>";
-const NOTE: &str =
-    "<p>A run opens with its own link, which it has printed; after that from here too.</p>";
+const NOTE: &str = "</div><p>A run opens with its own link, which it has printed; after that from here too.</p></main>";
+
+/// Keeps the list new, and leaves the focus where it is as long as the list is the same.
+const SCRIPT: &str = r#"const list = document.getElementById("runs");
+setInterval(async () => {
+  try {
+    const answer = await fetch(".", { cache: "no-store" });
+    if (!answer.ok) return;
+    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    const runs = page.getElementById("runs");
+    if (runs && runs.innerHTML !== list.innerHTML) list.innerHTML = runs.innerHTML;
+  } catch {
+    // The relay is away for a moment.
+  }
+}, 5000);
+"#;
 
 /// The runs as a page. Their names hold nothing that means something in HTML.
 pub(super) async fn page(State(relay): State<Arc<RelayState>>) -> Response {
@@ -40,6 +55,11 @@ pub(super) async fn page(State(relay): State<Arc<RelayState>>) -> Response {
     Html(page).into_response()
 }
 
+/// The script of the page.
+pub(super) async fn script() -> Response {
+    ([(CONTENT_TYPE, "text/javascript")], SCRIPT).into_response()
+}
+
 /// The runs as JSON.
 pub(super) async fn list(State(relay): State<Arc<RelayState>>) -> Response {
     let runs = relay.runs.list();
@@ -50,8 +70,7 @@ pub(super) async fn list(State(relay): State<Arc<RelayState>>) -> Response {
                    "connections": open})
         })
         .collect();
-    let kind = [(axum::http::header::CONTENT_TYPE, "application/json")];
-    (kind, json!({ "runs": runs }).to_string()).into_response()
+    ([(CONTENT_TYPE, "application/json")], json!({ "runs": runs }).to_string()).into_response()
 }
 
 fn seconds(since: SystemTime) -> u64 {
