@@ -305,13 +305,7 @@ fn garbage_on_the_port_changes_nothing() {
     let small = paused();
     let (mut run, link) = start(&small);
     let mut noise = vec![0u8; 1 << 16];
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    for byte in &mut noise {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        *byte = state.to_le_bytes()[3];
-    }
+    fastrand::Rng::with_seed(1).fill(&mut noise);
     let long_line = [b"GET /".as_slice(), &[b'a'; 1 << 16], b" HTTP/1.1\r\n\r\n"].concat();
     for bytes in [
         noise.as_slice(),

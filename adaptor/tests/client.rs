@@ -13,11 +13,11 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::JoinHandle,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
-use serde_json::Value;
+use serde_json::{Value, json};
 use tombolo::{
     OrderStatus, Parameter, Report,
     client::{Client, ClientError, Event, Link, Options, Received},
@@ -380,4 +380,59 @@ fn the_program_reaches_a_run() {
     let told = lines(&watching.2);
     assert_eq!((watching.0, &told.last().expect("a line")["end"]["how"]), (0, &"finished".into()));
     assert_eq!(run.end().orders.len(), 4);
+}
+
+#[test]
+fn the_program_lists_what_waits_and_replaces_it() {
+    let run = Run::new(LINK_TO_ALL);
+    let directory = tempfile::tempdir().expect("a directory");
+    let write = |name: &str, order: &Value| {
+        std::fs::write(directory.path().join(name), order.to_string()).expect("written");
+    };
+    let mut slow = squeeze(0.1);
+    slow["schedule"] = json!({"steps": 2, "every": {"steps": 1_000_000}});
+    write("slow.json", &slow);
+    write("second.json", &squeeze(0.2));
+    write("better.json", &squeeze(0.05));
+    let link = run.link.to_string();
+    let call = |task: &str, arguments: &[&str]| {
+        let (code, said, output) =
+            tombolo(directory.path(), &[&[task, link.as_str()], arguments, &["--json"]].concat());
+        (code, said, lines(&output))
+    };
+    let given = |task: &str, arguments: &[&str]| {
+        let (code, said, told) = call(task, arguments);
+        assert_eq!(code, 0, "{task} {arguments:?}: {said}");
+        told.last().expect("a line")["order"]["id"].as_str().expect("a name").to_owned()
+    };
+    let waiting = || {
+        let (code, said, told) = call("queue", &[]);
+        assert_eq!(code, 0, "{said}");
+        told.into_iter().map(|line| line["order"].clone()).collect::<Vec<_>>()
+    };
+    // It moves the mesh from its first shape on, and then rests for long.
+    let first = given("order", &["slow.json"]);
+    let begun = Instant::now();
+    while !waiting().is_empty() {
+        assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");
+    }
+    let second = given("order", &["second.json"]);
+    let (code, said, _) = tombolo(directory.path(), &["queue", link.as_str()]);
+    let expected = format!("order {second}: waits for order {first}");
+    assert!(code == 0 && said.contains(&expected), "{said}");
+
+    let better = given("replace", &[&second, "better.json"]);
+    let ids: Vec<_> = waiting().iter().map(|order| order["id"].clone()).collect();
+    assert_eq!(ids, [better.as_str()]);
+    for (order, reason) in [
+        (second.as_str(), "waits no more"),
+        (first.as_str(), "moves the mesh already"),
+        ("nobody", "there is no order 'nobody'"),
+    ] {
+        let (code, said, _) = call("replace", &[order, "second.json"]);
+        assert!(code == 1 && said.contains(reason), "{order}: {code}: {said}");
+    }
+    let (code, said, _) = call("cancel", &[&better]);
+    assert_eq!((code, waiting().len()), (0, 0), "{said}");
+    run.end();
 }

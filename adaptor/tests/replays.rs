@@ -4,7 +4,8 @@ mod common;
 
 use std::path::Path;
 
-use common::{Solver, Viewer, bits, config, random::Random, squeeze};
+use common::{Solver, Viewer, bits, config, squeeze};
+use fastrand::Rng;
 use serde_json::{Value, json};
 use tombolo::{OrderStatus, Settings, pipelines::language::parse_journal};
 
@@ -29,14 +30,14 @@ fn step(solver: &mut Solver, trace: &mut Trace) {
     trace.push((bits(&solver.mesh), solver.parameters.len()));
 }
 
-fn random_message(random: &mut Random, sent: u64) -> Value {
-    let amount = 0.05 + 0.01 * random.below(25) as f64;
-    let schedule = json!({"steps": 1 + random.below(5), "every": {"steps": 1 + random.below(4)}});
+fn random_message(random: &mut Rng, sent: u64) -> Value {
+    let amount = 0.05 + 0.01 * random.u64(..25) as f64;
+    let schedule = json!({"steps": 1 + random.u64(..5), "every": {"steps": 1 + random.u64(..4)}});
     let id = format!("m{sent}");
-    match random.below(14) {
-        0 => json!({"id": id, "order": {"undo": 1 + random.below(2), "schedule": schedule}}),
+    match random.u64(..14) {
+        0 => json!({"id": id, "order": {"undo": 1 + random.u64(..2), "schedule": schedule}}),
         1 => json!({"id": id, "order": {"stack": squeeze(amount)["edits"], "schedule": schedule}}),
-        2 => json!({"id": id, "cancel": {"order": format!("m{}", random.below(sent + 1))}}),
+        2 => json!({"id": id, "cancel": {"order": format!("m{}", random.u64(..sent + 1))}}),
         3 => json!({"id": id, "order": {"edits": [
             {"translate": {"features": ["nowhere"], "by": [1.0, 0.0, 0.0]}}]}}),
         // More than the guard lets through: clamped to what it does.
@@ -49,7 +50,7 @@ fn random_message(random: &mut Random, sent: u64) -> Value {
         8 => json!({"id": id, "order": squeeze(amount)}),
         9 | 10 => {
             json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule,
-                         "replaces": format!("m{}", random.below(sent + 1))}})
+                         "replaces": format!("m{}", random.u64(..sent + 1))}})
         }
         _ => json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule}}),
     }
@@ -58,14 +59,14 @@ fn random_message(random: &mut Random, sent: u64) -> Value {
 /// A run that a viewer steers at random. Returns what the solver saw, the journal at its end, and
 /// the orders that were acknowledged.
 fn random_run(seed: u64, output: &Path) -> (Trace, String, Vec<String>) {
-    let mut random = Random(seed);
+    let mut random = Rng::with_seed(seed);
     let mut solver = Solver::new(settings(output));
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     let mut trace = Trace::new();
     let mut sent = 0;
-    for _ in 0..20 + random.below(60) {
-        if random.below(4) == 0 {
+    for _ in 0..20 + random.u64(..60) {
+        if random.u64(..4) == 0 {
             let message = random_message(&mut random, sent);
             let pauses = message.get("pause").is_some();
             viewer.send(&message);
@@ -73,13 +74,13 @@ fn random_run(seed: u64, output: &Path) -> (Trace, String, Vec<String>) {
                 viewer.send(&json!({"id": format!("r{sent}"), "resume": {}}));
             }
             sent += 1;
-            if random.below(2) == 0 {
+            if random.u64(..2) == 0 {
                 // Sometimes what was sent has come in before the next step, and sometimes not.
                 viewer.look_for("order", std::time::Duration::from_millis(5), |_| false);
             }
         }
         step(&mut solver, &mut trace);
-        std::thread::sleep(std::time::Duration::from_micros(random.below(3000)));
+        std::thread::sleep(std::time::Duration::from_micros(random.u64(..3000)));
     }
     while viewer.look_for("nothing", std::time::Duration::from_millis(1), |_| true).is_some() {}
     let accepted = |message: &Value| {
@@ -131,9 +132,9 @@ fn random_runs_replay_to_the_bit_wherever_their_journals_end() {
         }
         moved += trace.windows(2).filter(|pair| pair[0] != pair[1]).count();
         // What the disk had when the machine lost its power: any beginning of the journal.
-        let mut random = Random(seed ^ 0x0dd);
+        let mut random = Rng::with_seed(seed ^ 0x0dd);
         for _ in 0..3 {
-            let end = random.below(journal.len() as u64 + 1) as usize;
+            let end = random.u64(..journal.len() as u64 + 1) as usize;
             let torn = &journal[..journal.floor_char_boundary(end)];
             let cycles = last_cycle(torn);
             let again = replay(torn, cycles);

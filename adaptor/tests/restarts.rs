@@ -4,7 +4,8 @@ mod common;
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use common::{Solver, Viewer, bits, config, random::Random, squeeze};
+use common::{Solver, Viewer, bits, config, squeeze};
+use fastrand::Rng;
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Channel, Checkpoint, OrderStatus, Settings, Step,
@@ -75,7 +76,7 @@ fn a_run_that_was_interrupted_anywhere_ends_as_one_that_was_not() {
     assert!(orders.iter().any(|order| order.status == OrderStatus::Rejected), "{orders:?}");
     assert!(orders.iter().any(|order| order.fraction.is_some_and(|it| it < 1.0)), "{orders:?}");
     assert!(whole.windows(2).filter(|pair| pair[0].0 != pair[1].0).count() > 25);
-    let mut random = Random(7);
+    let mut random = Rng::with_seed(7);
     for interrupted in (0..CYCLES).step_by(5) {
         let output = tempfile::tempdir().unwrap();
         let mut trace = Trace::new();
@@ -84,7 +85,7 @@ fn a_run_that_was_interrupted_anywhere_ends_as_one_that_was_not() {
         let bytes = solver.adaptor.checkpoint().to_bytes();
         let mesh = solver.mesh.clone();
         // It went on for a while before it was killed.
-        let lost = random.below(CYCLES - interrupted);
+        let lost = random.u64(..CYCLES - interrupted);
         (0..lost).for_each(|_| step(&mut solver, &mut Trace::new()));
         drop(solver);
         wait_for_lock(&output.path().join("journal.jsonl"));
@@ -109,14 +110,14 @@ fn a_run_that_was_interrupted_anywhere_ends_as_one_that_was_not() {
     }
 }
 
-fn random_message(random: &mut Random, sent: u64) -> Value {
-    let amount = 0.05 + 0.01 * random.below(25) as f64;
-    let schedule = json!({"steps": 1 + random.below(5), "every": {"steps": 1 + random.below(4)}});
+fn random_message(random: &mut Rng, sent: u64) -> Value {
+    let amount = 0.05 + 0.01 * random.u64(..25) as f64;
+    let schedule = json!({"steps": 1 + random.u64(..5), "every": {"steps": 1 + random.u64(..4)}});
     let id = format!("m{sent}");
-    match random.below(10) {
-        0 => json!({"id": id, "order": {"undo": 1 + random.below(2), "schedule": schedule}}),
+    match random.u64(..10) {
+        0 => json!({"id": id, "order": {"undo": 1 + random.u64(..2), "schedule": schedule}}),
         1 => json!({"id": id, "order": {"stack": squeeze(amount)["edits"], "schedule": schedule}}),
-        2 => json!({"id": id, "cancel": {"order": format!("m{}", random.below(sent + 1))}}),
+        2 => json!({"id": id, "cancel": {"order": format!("m{}", random.u64(..sent + 1))}}),
         3 => json!({"id": id, "order": {"edits": squeeze(1.5)["edits"], "schedule": schedule,
                     "guard": {"otherwise": "clamp"}}}),
         4 => json!({"id": id, "parameter": {"name": "heating", "value": amount}}),
@@ -154,21 +155,21 @@ fn what_was_accepted_after_the_checkpoint_is_done_again() {
     let seeds = std::env::var("TOMBOLO_SEEDS").ok().and_then(|text| text.parse().ok());
     let mut done_again = 0;
     for seed in 0..seeds.unwrap_or(6) {
-        let mut random = Random(seed);
+        let mut random = Rng::with_seed(seed);
         let output = tempfile::tempdir().unwrap();
         let file = output.path().join("journal.jsonl");
         let mut solver = Solver::new(settings(output.path(), true));
         let mut viewer = Viewer::connect(&solver.adaptor);
         viewer.hello();
         let mut trace = Trace::new();
-        let (saved, killed) = (5 + random.below(30), 6 + random.below(30));
+        let (saved, killed) = (5 + random.u64(..30), 6 + random.u64(..30));
         let mut state = None;
         let mut sent = 0;
         for cycle in 0..saved + killed {
-            if random.below(4) == 0 {
+            if random.u64(..4) == 0 {
                 viewer.send(&random_message(&mut random, sent));
                 sent += 1;
-                if random.below(2) == 0 {
+                if random.u64(..2) == 0 {
                     viewer.look_for("order", Duration::from_millis(5), |_| false);
                 }
             }
@@ -176,7 +177,7 @@ fn what_was_accepted_after_the_checkpoint_is_done_again() {
                 state = Some((solver.adaptor.checkpoint(), solver.mesh.clone()));
             }
             step(&mut solver, &mut trace);
-            std::thread::sleep(Duration::from_micros(random.below(3000)));
+            std::thread::sleep(Duration::from_micros(random.u64(..3000)));
         }
         while viewer.look_for("nothing", Duration::from_millis(1), |_| true).is_some() {}
         let accepted = |message: &Value| {
@@ -189,8 +190,8 @@ fn what_was_accepted_after_the_checkpoint_is_done_again() {
         let journal = std::fs::read_to_string(&file).unwrap();
         // What the disk had when the machine lost its power.
         let mark = journal.find("{\"checkpoint\":").unwrap();
-        if random.below(2) == 0 {
-            let end = mark + random.below((journal.len() - mark) as u64 + 1) as usize;
+        if random.u64(..2) == 0 {
+            let end = mark + random.u64(..(journal.len() - mark) as u64 + 1) as usize;
             std::fs::write(&file, &journal[..journal.floor_char_boundary(end)]).unwrap();
             acknowledged.clear();
         }

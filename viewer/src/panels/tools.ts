@@ -10,6 +10,8 @@ export class CameraTools {
   private looking = "";
 
   constructor(root: HTMLElement, private readonly scene: Scene) {
+    // What is said over the picture stands below the buttons, however many rows they take.
+    new ResizeObserver(() => document.body.style.setProperty("--tools-height", `${root.offsetHeight}px`)).observe(root);
     root.addEventListener("click", (event) => {
       const button = (event.target as HTMLElement).closest("button");
       const camera = button?.dataset.camera;

@@ -162,11 +162,21 @@ fn with_displacements(mut order: Order, client: &Client) -> Result<Order, Failur
 
 fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(), Failure> {
     let id = client.order(order).map_err(failed)?;
-    let bar = !as_json && std::io::stderr().is_terminal();
+    let bar = wait && !as_json && std::io::stderr().is_terminal();
+    // The run first takes the order, and then has it take the place of another.
+    let mut is_placed = order.replaces.is_none();
+    let mut is_taken = false;
     loop {
         let told = next(client, if wait { WAIT } else { ANSWER })?;
         let report = match &told.event {
             Event::Order(report) if report.id == id => report,
+            Event::Order(other) if order.replaces.as_ref() == Some(&other.id) => {
+                is_placed |= is_taken && other.status == OrderStatus::Rejected;
+                if is_placed && !wait {
+                    return Ok(());
+                }
+                continue;
+            }
             // The connection was made again, and the run has the order.
             Event::Hello(hello) => match hello.orders.iter().find(|report| report.id == id) {
                 Some(report) => report,
@@ -177,11 +187,11 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
                 continue;
             }
         };
-        let is_over =
-            matches!(report.status, OrderStatus::Applied | OrderStatus::Rejected) || !wait;
+        is_taken = true;
+        let has_ended = matches!(report.status, OrderStatus::Applied | OrderStatus::Rejected);
         if as_json {
             say(serde_json::json!({"order": report}))?;
-        } else if is_over || !bar {
+        } else if has_ended || !bar {
             say(line(report))?;
         } else {
             draw(report);
@@ -195,7 +205,9 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
                     Failure::Wrong(format!("rejected: {reason}"))
                 });
             }
-            _ if is_over => return Ok(()),
+            OrderStatus::Applied => return Ok(()),
+            OrderStatus::Accepted if !is_placed => {}
+            _ if !wait => return Ok(()),
             _ => {}
         }
     }
