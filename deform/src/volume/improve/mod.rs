@@ -13,7 +13,6 @@ use crate::mesh::{Domain, Numbering, Ordered, Vector};
 use crate::topology::{Groups, marked};
 use simplices::simplices;
 use sweep::Sweeps;
-use worth::ENOUGH;
 
 /// Vertices stay where none of their cells has lost more than this part of its quality.
 const GOOD: f64 = 0.95;
@@ -25,10 +24,12 @@ const GOOD: f64 = 0.95;
 /// is *worn* where it has less than 0.95 of it.
 ///
 /// 1. A mesh without worn cells stays, and so does one with a cell turned inside out.
-/// 2. Where no cell is below 0.8, the vertices of one colour are swept through, and what came of it
-///    is looked at: where the mean gains less than a whole sweep would that adds a thousandth to
-///    each worn cell, the mesh stays as it was. So it is after most orders, whose solve has spread
-///    what was asked for over all cells: what lifts the least a little costs the others as much.
+/// 2. It is *enough* where no cell is below 0.8, or below the worst of the cells that cannot be
+///    moved, whose quality the mesh keeps whatever the others gain. Then the vertices of one colour
+///    are swept through, and what came of it is looked at: where the mean gains less than a whole
+///    sweep would that adds a thousandth to each worn cell, the mesh stays as it was. So it is after
+///    most orders, whose solve has spread what was asked for over all cells: what lifts the least a
+///    little costs the others as much.
 /// 3. Else there are sweeps through the vertices of worn cells, a colour after the other: vertices
 ///    of one colour share no cell, and move at the same time, on all threads. Each vertex goes down
 ///
@@ -40,9 +41,9 @@ const GOOD: f64 = 0.95;
 ///    lifted first and all others gain as far as these let them.
 /// 4. A vertex without worn cells is asleep until a neighbour moves: it would stay, and is not
 ///    looked at.
-/// 5. Sweeps end after as many as are allowed, or where one was not worth it: from a least quality
-///    of 0.8 on as in step 2, below it where neither the mean nor the least quality rises by a
-///    millionth.
+/// 5. Sweeps end after as many as are allowed, or where one was not worth it: where it is enough as
+///    in step 2, else where neither the mean nor the least quality rises by a millionth. It is taken
+///    back where it has raised neither the mean nor the least quality of the mesh.
 ///
 /// L. Freitag, C. Ollivier-Gooch (*Tetrahedral mesh improvement using swapping and smoothing*,
 /// 1997) show why one vertex at a time is enough where a mesh is nearly good: what a linear solve
@@ -57,8 +58,8 @@ const GOOD: f64 = 0.95;
 /// - The same bits whatever the number of threads; the same places, to rounding, however the
 ///   vertices are numbered and whatever parts the mesh is in.
 ///
-/// It does *not* guarantee that the mean quality rises: where the least is below 0.8, the mean may
-/// pay for it.
+/// It does *not* guarantee that the mean quality rises: where the least is too low, the mean may pay
+/// for it.
 #[derive(Debug)]
 pub struct Improver {
     /// The numbering of the ordered mesh, whose numbers all vertices here have.
@@ -70,6 +71,8 @@ pub struct Improver {
     incident: Groups<u32>,
     /// The simplices that have a free vertex.
     movable: Vec<u32>,
+    /// The simplices that have none.
+    fixed: Vec<u32>,
     interface: Option<Interface>,
     /// Vertices none of whose cells is below this stay.
     good: f64,
@@ -107,15 +110,17 @@ impl Improver {
         let corners = simplices.iter().flat_map(|simplex| simplex.vertices).zip(0u32..);
         let incident =
             Groups::new(free.len(), corners.filter(|(vertex, _)| free[*vertex as usize]));
-        let is_movable =
-            |simplex: &Simplex| simplex.vertices.iter().any(|&vertex| free[vertex as usize]);
-        let movable = marked(&simplices.iter().map(is_movable).collect::<Vec<_>>());
+        let is_movable = |&simplex: &u32| {
+            simplices[simplex as usize].vertices.iter().any(|&vertex| free[vertex as usize])
+        };
+        let (movable, fixed) = (0..).take(simplices.len()).partition(is_movable);
         let mut improver = Self {
             numbering,
             simplices,
             colours: Vec::new(),
             incident,
             movable,
+            fixed,
             interface: None,
             good: GOOD,
             untiring: false,
@@ -178,14 +183,15 @@ impl Improver {
         if sweeps == 0 || least.is_nan() || least <= 0.0 || least >= self.good {
             return false;
         }
+        let held = self.held(&near);
         let sweeping = Sweeps::new(self);
-        let mut last = before;
-        let mut tried = 0;
-        if !self.untiring && least >= ENOUGH {
+        let (mut last, mut kept) = (before, near.clone());
+        let (mut tried, mut has_gained) = (0, false);
+        if !self.untiring && before.are_enough(held) {
             tried = self.colours.len().min(1);
             sweeping.through(&mut near, 0..tried, least);
             let part = 1.0 / self.colours.len().max(1) as f64;
-            if !self.qualities(&near).are_worth_more(&before, part) {
+            if !self.qualities(&near).are_worth_more(&before, held, part) {
                 return false;
             }
         }
@@ -193,15 +199,18 @@ impl Improver {
             sweeping.through(&mut near, tried..self.colours.len(), last.least);
             tried = 0;
             let now = self.qualities(&near);
-            let worth = self.untiring || now.are_worth_more(&last, 1.0);
-            last = now;
+            let worth = self.untiring || now.are_worth_more(&last, held, 1.0);
+            if worth || now.are_better(&last, held) {
+                kept.copy_from_slice(&near);
+                (last, has_gained) = (now, true);
+            }
             if !worth {
                 break;
             }
         }
-        let better = last.least >= least;
+        let better = has_gained && last.least >= least;
         if better {
-            self.numbering.scatter(&near, points);
+            self.numbering.scatter(&kept, points);
         }
         better
     }

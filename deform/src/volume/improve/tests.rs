@@ -86,12 +86,29 @@ fn what_gains_nothing_stays_as_it_was_solved() {
     let sheared: Vec<Vector> =
         mesh.points().iter().map(|&[x, y, z]| [x + 0.08 * z * z, y, z]).collect();
     let (least, _) = spread(&mesh, &sheared);
-    assert!(least > ENOUGH && least < GOOD, "{least}");
+    assert!(least > worth::ENOUGH && least < GOOD, "{least}");
     let mut points = sheared.clone();
     assert!(!Improver::new(&mesh, &boundary).improve(&mut points, 10));
     assert_eq!(points, sheared);
     assert!(Improver::new(&mesh, &boundary).lifting_to(GOOD).improve(&mut points, 10));
     assert_ne!(points, sheared);
+}
+
+/// Beside the cells in the edges of the box, which have no vertex inside and keep what the shear has
+/// left them, lifting the others would cost the mean and gain nothing.
+#[test]
+fn what_cells_that_cannot_move_hold_down_is_left_to_the_mean() {
+    let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
+    let boundary = boundary(&mesh);
+    let improver = Improver::new(&mesh, &boundary);
+    let sheared: Vec<Vector> =
+        mesh.points().iter().map(|&[x, y, z]| [x + 0.3 * z * z, y, z]).collect();
+    let near = improver.numbering.gather(&sheared).into_owned();
+    let (least, held) = (improver.qualities(&near).least, improver.held(&near));
+    assert!(held < least + 1e-12 && least < worth::ENOUGH, "{held}, {least}");
+    let mut points = sheared.clone();
+    assert!(!improver.improve(&mut points, 10));
+    assert_eq!(points, sheared);
 }
 
 /// Whatever has been gained for good, further sweeps would change by rounding alone.

@@ -14,7 +14,7 @@ pub(super) const ENOUGH: f64 = 0.8;
 /// The least mean gain in quality per worn cell that makes a sweep worthwhile.
 const GAIN: f64 = 1e-3;
 
-/// The least gain in the mean or the least quality while that is still too low.
+/// The least gain in the mean or the least quality while that is still too low; less is rounding.
 const REST: f64 = 1e-6;
 
 /// The quality of what can be moved, on all ranks.
@@ -40,12 +40,27 @@ impl Qualities {
         }
     }
 
+    /// Whether the least is as high as it should be, or as the mesh can have it, whose cells that
+    /// cannot be moved have `held`: it is the mean that counts from there on.
+    pub(super) fn are_enough(&self, held: f64) -> bool {
+        self.least + REST >= held.min(ENOUGH)
+    }
+
     /// Whether these are so much better than those `before` a sweep, or a part of one, that the
     /// sweep was worth it.
-    pub(super) fn are_worth_more(&self, before: &Self, part: f64) -> bool {
+    pub(super) fn are_worth_more(&self, before: &Self, held: f64, part: f64) -> bool {
         let gain = (self.sum - before.sum) / before.worn.max(1.0);
-        let rise = self.least - before.least;
-        gain >= part * GAIN || before.least < ENOUGH && gain.max(rise) >= REST
+        gain >= part * GAIN || !before.are_enough(held) && gain.max(self.rise(before, held)) >= REST
+    }
+
+    /// Whether the mesh is better by these than by those `before`.
+    pub(super) fn are_better(&self, before: &Self, held: f64) -> bool {
+        self.sum > before.sum || self.rise(before, held) >= REST
+    }
+
+    /// By how much the least quality of the mesh has risen.
+    fn rise(&self, before: &Self, held: f64) -> f64 {
+        self.least.min(held) - before.least.min(held)
     }
 }
 
@@ -71,5 +86,16 @@ impl Improver {
             found = Qualities { least: least[0], sum: sums[0], worn: sums[1] };
         }
         found
+    }
+
+    /// The least quality of the cells that cannot be moved: the mesh keeps it, whatever the others
+    /// gain. Collective.
+    pub(super) fn held(&self, points: &[Vector]) -> f64 {
+        let quality = |&simplex: &u32| self.simplices[simplex as usize].least(points);
+        let mut held = [self.fixed.iter().map(quality).fold(f64::INFINITY, f64::min)];
+        if let Some(Interface { held: shared, .. }) = &self.interface {
+            shared.halo().communicator().reduce(Reduction::Minimum, &mut held);
+        }
+        held[0]
     }
 }
