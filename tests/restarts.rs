@@ -1,11 +1,8 @@
 //! `flow` killed anywhere and restarted ends as if nothing had happened, to the bit.
 
-#[path = "../adaptor/tests/common/random.rs"]
-mod random;
-
 use std::time::Duration;
 
-use random::Random;
+use fastrand::Rng;
 use serde_json::{Value, json};
 use tombolo_tests::{PATIENCE, Run, Small};
 
@@ -64,7 +61,7 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
     let small = prepared();
     let state = small.path("out/flow.state");
     std::fs::create_dir_all(small.path("out")).expect("a folder");
-    let mut random = Random(11);
+    let mut random = Rng::with_seed(11);
     let mut killed = 0;
     loop {
         let before = std::fs::read(&state).ok();
@@ -83,7 +80,7 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
             assert!(status.success(), "after {killed} kills: {text}");
             break;
         }
-        std::thread::sleep(Duration::from_micros(random.below(20_000)));
+        std::thread::sleep(Duration::from_micros(random.u64(..20_000)));
         run.signal("KILL");
         drop(run);
         killed += 1;
