@@ -1,17 +1,18 @@
 /** The editor of one pipeline: its text with the checker's marks, what stands at the cursor, and what the run says to it. */
-import type { FieldInformation, Json } from "../connection/protocol";
+import type { Json } from "../connection/protocol";
 import { element, part, write } from "../dom";
 import type { Checker } from "../pipelines/checker";
 import type { PipelineEditor } from "../pipelines/editor";
 import { markOf, refusalMark } from "../pipelines/marks";
 import type { Mark } from "../pipelines/marks";
-import { placeAt } from "../pipelines/place";
+import { namesAt, namesOf } from "../pipelines/names";
+import { placeAt, readSoFar } from "../pipelines/place";
+import type { Path } from "../pipelines/place";
 import { descriptionAt } from "../pipelines/suggestions";
 import type { KnownNames } from "../pipelines/suggestions";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { changeOf, isChanged, openDraft } from "../store/pipeline-drafts";
-import { QUALITY } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
@@ -140,10 +141,17 @@ export class PipelineEditorPanel {
     const [{ PipelineEditor }, schema] = await Promise.all([this.parts.load(), this.parts.schema()]);
     this.schema = schema;
     this.editor = new PipelineEditor(part("pipeline-text"), "the pipeline as JSON", {
-      schema: () => this.schema, names: () => knownNames(this.store.state),
+      schema: () => this.schema, names: (path) => this.names(path),
       written: (text) => this.store.dispatch({ type: "pipeline written", text }),
       moved: (offset) => this.describe(offset), apply: () => this.apply(), leave: () => this.leave(),
     });
+  }
+
+  /** The names that may be written at a path of the text. */
+  private names(path: Path): KnownNames {
+    const { state } = this.store;
+    const draft = openDraft(state.pipelines);
+    return namesAt(namesOf(state), readSoFar(draft?.text ?? ""), draft?.replaced ?? null, path);
   }
 
   /** Says what stands at the cursor. */
@@ -197,17 +205,4 @@ export class PipelineEditorPanel {
     const row = [...part("pipelines").querySelectorAll<HTMLElement>("li")].find(({ dataset }) => dataset.pipeline === name);
     (row?.querySelector<HTMLElement>("button") ?? part("pipeline-add")).focus();
   }
-}
-
-/** The names that can be written into a pipeline of this run. */
-export function knownNames({ hello, pipelines }: State): KnownNames {
-  const described = ({ association, components, unit }: FieldInformation): string =>
-    `${components === 1 ? "A scalar" : components === 3 ? "A vector" : `${components} components`} at each ${association}${unit ? `, in ${unit}` : ""}.`;
-  const fields = (hello?.fields ?? []).map((field) => ({ name: field.name, description: described(field) }));
-  if (!fields.some(({ name }) => name === QUALITY)) fields.push({ name: QUALITY, description: "The quality of the cells: 1 is ideal, 0 is inverted." });
-  const channels = [hello?.channel, ...pipelines.known.map(({ channel }) => channel)].filter((name): name is string => typeof name === "string");
-  return {
-    fields, features: hello?.features.map(({ name }) => name) ?? [], monitors: [...new Set(hello?.monitors?.map(({ name }) => name))],
-    channels: [...new Set(channels)], parameters: hello?.parameters.map(({ name }) => name) ?? [],
-  };
 }

@@ -13,14 +13,17 @@ import { EditorView, drawSelection, highlightActiveLine, keymap, lineNumbers } f
 import { tags } from "@lezer/highlight";
 import type { Json } from "../connection/protocol";
 import type { Mark } from "./marks";
+import { isFormula, isMessage } from "./formula";
 import { placeAt } from "./place";
-import { formulaNames, isFormula, suggestionsAt } from "./suggestions";
+import type { Path } from "./place";
+import { formulaNames, suggestionsAt } from "./suggestions";
 import type { KnownNames, Suggestion } from "./suggestions";
 
 /** What the editor asks, and whom it tells. */
 export interface Surroundings {
   schema(): Json;
-  names(): KnownNames;
+  /** The names that may be written at a path. */
+  names(path: Path): KnownNames;
   written(text: string): void;
   /** The cursor is elsewhere. */
   moved(offset: number): void;
@@ -152,18 +155,22 @@ export class PipelineEditor {
     if (!place || context.state.readOnly) return null;
     const token = text.slice(place.from, place.to);
     if (token === "" && !context.explicit) return null;
-    if (place.part === "value" && token.startsWith('"') && isFormula(place.path)) return this.inFormula(context, place.path);
-    const suggestions = suggestionsAt(this.surroundings.schema(), place, this.surroundings.names());
+    if (place.part === "value" && token.startsWith('"') && (isFormula(place.path) || isMessage(place.path))) return this.inFormula(context, place.path);
+    const suggestions = suggestionsAt(this.surroundings.schema(), place, this.surroundings.names(place.path));
     const from = place.from + (token.startsWith('"') ? 1 : 0);
     return { from, options: suggestions.map((suggestion, index) => option(suggestion, (view) => take(view, suggestion), index)), validFor: /^[^"]*$/ };
   }
 
-  /** The names that begin with the word before the cursor. */
-  private inFormula(context: CompletionContext, path: readonly (string | number)[]): CompletionResult | null {
-    const word = context.matchBefore(/\{?[A-Za-z_][\w./]*/);
-    if (!word && !context.explicit) return null;
-    const options = formulaNames(path, this.surroundings.names());
-    return { from: word?.from ?? context.pos, options: options.map((suggestion, index) => ({ ...option(suggestion, undefined, index), apply: suggestion.insert })) };
+  /** The names that begin with what stands before the cursor: a word, or in a line of the log and where one was opened a brace. */
+  private inFormula(context: CompletionContext, path: Path): CompletionResult | null {
+    const inBraces = context.matchBefore(/\{[^{}"]*/);
+    const word = inBraces ?? (isMessage(path) ? null : context.matchBefore(/[A-Za-z_][\w.]*/));
+    if (!word && (isMessage(path) || !context.explicit)) return null;
+    const isClosed = context.state.doc.sliceString(context.pos, context.pos + 1) === "}";
+    const options = formulaNames(path, this.surroundings.names(path)).map((suggestion, index) => ({
+      ...option(suggestion, undefined, index), apply: inBraces ? `${suggestion.label}${isClosed ? "" : "}"}` : suggestion.insert,
+    }));
+    return { from: inBraces ? inBraces.from + 1 : word?.from ?? context.pos, options };
   }
 }
 

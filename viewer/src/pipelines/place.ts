@@ -1,4 +1,5 @@
-/** Where in a JSON text something stands, also in one that is being written and has no end yet. */
+/** Where in a JSON text something stands, and what it says; also in one that is being written and has no end yet. */
+import type { Json } from "../connection/protocol";
 
 /** The way from the outermost value: keys and indices. */
 export type Path = readonly (string | number)[];
@@ -109,6 +110,41 @@ export function placeAt(text: string, offset: number): Place | null {
   });
   if (!isOver) note(levels, offset, offset);
   return found === null ? null : { ...(found as Omit<Place, "keys">), keys: [...new Set(others)] };
+}
+
+/** The value of a text as far as it is written: what has no value yet is left out. */
+export function readSoFar(text: string): Json {
+  let root: Json = null;
+  walk(text, (token, levels) => {
+    const level = levels.at(-1);
+    const value = valueBegunBy(text.slice(token.from, token.to));
+    if (value === undefined || (level && level.expects !== "value")) return false;
+    if (level) put(root, pathOf(levels), value);
+    else root = value;
+    return false;
+  });
+  return root;
+}
+
+/** The value that begins with a token; undefined for none. */
+function valueBegunBy(token: string): Json | undefined {
+  if (token === "{") return {};
+  if (token === "[") return [];
+  if (token.startsWith('"')) return content(token);
+  try {
+    return JSON.parse(token) as Json;
+  } catch {
+    return undefined;
+  }
+}
+
+/** Puts a value at a path of another; nowhere, where the way there is none. */
+function put(root: Json, path: Path, value: Json): void {
+  let at: Json | undefined = root;
+  for (const step of path.slice(0, -1)) at = typeof at === "object" && at !== null && Object.hasOwn(at, step) ? (at as { [key: string]: Json })[step] : undefined;
+  const last = path.at(-1);
+  if (typeof at !== "object" || at === null || last === undefined || Array.isArray(at) !== (typeof last === "number")) return;
+  Object.defineProperty(at, last, { value, writable: true, enumerable: true, configurable: true });
 }
 
 /** The token at a line and column, counted from 1 in characters as the checker does. Of an object or a list it is the bracket. */

@@ -1,9 +1,10 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it, vi } from "vitest";
-import { PipelineEditorPanel, knownNames } from "../../src/panels/pipeline-editor";
+import { PipelineEditorPanel } from "../../src/panels/pipeline-editor";
 import { PipelinesPanel } from "../../src/panels/pipelines";
 import { Checker } from "../../src/pipelines/checker";
 import type { CheckAnswer, CheckWorker } from "../../src/pipelines/checker";
+import { namesAt, namesOf } from "../../src/pipelines/names";
 import type { PipelineQuestion } from "../../src/kernel/language";
 import { keyOf, readDrafts } from "../../src/store/pipeline-drafts";
 import type { Pipeline } from "../../src/store/pipelines";
@@ -67,7 +68,7 @@ describe("the pipelines of a run", () => {
     made.store.dispatch({ type: "status", status: { ...STATUS, pipelines: [{ name: "cut", runs: 2, seconds: 0.004, bytes: 3000, memory: 0, every: 1 }] }, at: 0 });
     await vi.advanceTimersByTimeAsync(1000);
     expect([...row("cut").querySelectorAll(".title, .detail")].map(({ textContent }) => textContent)).toEqual(["cut", "slice across x at 1 → streamed", "every 5 steps · 2\u00a0ms, 1.5\u00a0kB a run"]);
-    expect(knownNames(made.store.state)).toMatchObject({ features: ["inlet", "outlet", "wall", "throat"], monitors: ["quality.min"] });
+    expect(namesAt(namesOf(made.store.state), {}, null, ["when"])).toMatchObject({ features: ["inlet", "outlet", "wall", "throat"], monitors: ["quality.min"] });
   });
 
   it("are read by one who watches, and changed by nobody else than the one who steers", async () => {
