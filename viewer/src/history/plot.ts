@@ -58,6 +58,10 @@ export class HistoryPlot implements Tab {
     if (shown) this.draw();
   }
 
+  recolour(): void {
+    this.plot?.redraw(false);
+  }
+
   /** There are new values. */
   update(): void {
     if (!this.isShown || this.isEmpty) return;

@@ -39,6 +39,10 @@ export abstract class ValuePlot implements Tab {
     if (shown) this.draw();
   }
 
+  recolour(): void {
+    this.plot?.redraw(false);
+  }
+
   /** There are new values. */
   update(): void {
     if (!this.isShown) return;
