@@ -7,6 +7,7 @@ import { COLOURS, axesOf, labelled, padded } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
+import { ValueTable } from "./table";
 
 /** The most series that are drawn at once: one for each colour. */
 const DRAWN = COLOURS.length;
@@ -33,17 +34,16 @@ export class HistoryPlot implements Tab {
   private zoom: [number, number] | null = null;
   private readonly canvas = element("div", { class: "plot" });
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
-  private readonly table = element("tbody");
   private readonly heading = element("span", { class: "hint" });
+  private readonly table = new ValueTable(["value", "before", "difference"], this.heading);
   private readonly whole: HTMLButtonElement;
 
   /** `picked` are the series that were chosen before; null for those that a person who asks for nothing wants to see. */
   constructor(private readonly history: History, private picked: readonly string[] | null, private readonly changed: (picked: readonly string[]) => void) {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     const csv = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
-    const headings = [element("td"), ...["value", "before", "difference"].map((text) => element("th", { scope: "col" }, text))];
     this.body = element("div", { class: "dock-body" }, this.canvas,
-      element("div", { class: "values" }, element("table", {}, element("caption", {}, this.heading), element("thead", {}, element("tr", {}, ...headings)), this.table),
+      element("div", { class: "values" }, this.table.element,
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
     this.tools = [element("span", { class: "hint" }, "drag to zoom · double-click for the whole"), this.whole, csv];
     new ResizeObserver(() => this.resize()).observe(this.canvas);
@@ -231,15 +231,11 @@ export class HistoryPlot implements Tab {
       order = found.order ?? order;
       const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
       const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      // Beside the name, which stays as readable as the rest.
-      const colour = element("span", { class: "colour", "aria-hidden": "true" });
-      colour.style.background = COLOURS[i] ?? "";
-      const name = element("th", { scope: "row" }, colour, one ? label(one) : "");
-      return element("tr", {}, name, ...cells.map((text) => element("td", {}, text)));
+      return { name: one ? label(one) : "", colour: COLOURS[i] ?? "", cells };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
     write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
-    this.table.replaceChildren(...rows);
+    this.table.show(rows);
   }
 
   private size(): { width: number; height: number } {
