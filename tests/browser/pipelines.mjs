@@ -114,17 +114,41 @@ const steps = [
     await checked("No errors.");
     check((await text()).includes('"normal"'), `the text is ${await text()}`);
   }],
-  ["what the run alone can know is marked once it has refused it", async () => {
+  ["a field that nobody has is warned of with the nearest name, and the run has the last word", async () => {
     await behind('"pressure');
     await page.keyboard.press("Backspace");
-    await checked("No errors.");
+    await checked("No errors, 1 warning.");
+    await anna.holds("the mark", () => document.querySelector(".cm-lintRange-warning")?.textContent === '"pressur"');
+    check(/select\.fields\[0\]: neither the run nor a stage before has a field “pressur”; did you mean pressure\?/.test(await anna.text("#pipeline-errors .warning")), `it says ${await anna.text("#pipeline-errors")}`);
+    check(await page.isEnabled("#pipeline-apply"), "a warning keeps the pipeline from being applied");
+    await page.keyboard.press("F8");
+    await anna.holds("the warning at the cursor", () => /neither the run/.test(document.querySelector(".cm-panel-lint, .cm-tooltip-lint, .cm-diagnostic-warning")?.textContent ?? ""));
+    await anna.picture("warned");
+    await clean(anna, "with a warning");
     await page.keyboard.press("Control+Enter");
     await told("The run refused it:");
     await anna.holds("the mark", () => document.querySelector(".cm-lintRange-error")?.textContent === '"pressur"');
+    check(await page.locator("#pipeline-errors li").count() === 1, `it says twice ${await anna.text("#pipeline-errors")}`);
     await anna.picture("refused");
     await page.click('#pipeline-errors [data-act="fix"]');
     await checked("No errors.");
     check(await page.isDisabled("#pipeline-apply"), "what is there already can be applied again");
+  }],
+  ["a field that an earlier stage derives is completed, and not warned of", async () => {
+    await behind('"stages": [');
+    await page.keyboard.press("Enter");
+    await page.keyboard.type('{ "gradient": { "field": "pressure", "name": "slope" } },');
+    await checked("No errors.");
+    await behind('["pressure"');
+    await page.keyboard.type(', "slo');
+    await anna.holds("the derived field", () => /^slope.*field/.test(document.querySelector(".cm-tooltip-autocomplete li")?.textContent));
+    await anna.picture("derived");
+    await page.waitForTimeout(150);
+    await page.keyboard.press("Enter");
+    await checked("No errors.");
+    check((await text()).includes('["pressure", "slope"]'), `the text is ${await text()}`);
+    await page.click("#pipeline-revert");
+    await checked("No errors.");
   }],
   ["a draft is kept when the editor is left, Tab leaves the text, and all is reached by keyboard", async () => {
     await page.keyboard.press("Escape");

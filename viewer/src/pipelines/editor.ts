@@ -60,8 +60,10 @@ const THEME = EditorView.theme({
   ".cm-tooltip.cm-completionInfo": { padding: "6px 9px", maxWidth: "280px", lineHeight: "1.4" },
   ".cm-diagnostic": { padding: "5px 9px", maxWidth: "340px" },
   ".cm-diagnostic-error": { borderLeftColor: "var(--bad)" },
+  ".cm-diagnostic-warning": { borderLeftColor: "var(--low)" },
   ".cm-diagnosticAction": { backgroundColor: "var(--raised)", color: "var(--text)", border: "1px solid var(--line)", minHeight: "24px" },
   ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy var(--bad) 1.5px", textUnderlineOffset: "3px" },
+  ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy var(--low) 1.5px", textUnderlineOffset: "3px" },
 });
 
 /** Puts a suggestion in place of what was begun, and the cursor where one goes on. */
@@ -128,8 +130,8 @@ export class PipelineEditor {
 
   mark(marks: readonly Mark[]): void {
     const { state } = this.view;
-    this.view.dispatch(setDiagnostics(state, marks.filter(({ to }) => to <= state.doc.length).map(({ from, to, text, fix }) => ({
-      from, to, severity: "error" as const, message: text, actions: fix ? [{ name: `Use ${fix.name}`, apply: () => this.replace(from, to, fix.insert) }] : [],
+    this.view.dispatch(setDiagnostics(state, marks.filter(({ to }) => to <= state.doc.length).map(({ from, to, text, fix, isWarning }) => ({
+      from, to, severity: isWarning ? "warning" as const : "error" as const, message: text, actions: fix ? [{ name: `Use ${fix.name}`, apply: () => this.replace(from, to, fix.insert) }] : [],
     }))));
   }
 

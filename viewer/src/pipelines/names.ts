@@ -3,7 +3,7 @@ import type { FieldInformation, Json, MonitorInformation } from "../connection/p
 import { QUALITY } from "../store/pipelines";
 import type { State } from "../store/state";
 import type { Path } from "./place";
-import { madeFields, madeMonitors } from "./stages";
+import { isBody, isLookedAt, madeFields, madeMonitors } from "./stages";
 import type { KnownNames } from "./suggestions";
 
 /** The names of a run. */
@@ -22,10 +22,17 @@ export function namesOf({ hello, pipelines }: Pick<State, "hello" | "pipelines">
   };
 }
 
+/** Whether the fields and features of a run are those that a pipeline reads: of the channel whose mesh orders change, which is the solver's first where none is named. */
+export function readsDescribed({ hello, pipelines }: Pick<State, "hello" | "pipelines">, pipeline: Json): boolean {
+  const channel = isBody(pipeline) ? pipeline.channel : null;
+  if (typeof channel === "string") return channel === hello?.channel;
+  return pipelines.known.every((known) => known.on !== "order" || typeof known.channel !== "string");
+}
+
 /** The names that may be written at a path of a pipeline; `replaced` is the pipeline of the run that it takes the place of. */
 export function namesAt(run: RunNames, pipeline: Json, replaced: string | null, path: Path): KnownNames {
   const measured = { name: QUALITY, description: "The quality of the cells: 1 is ideal, 0 is inverted." };
-  const fields = [...run.fields, measured, ...madeFields(pipeline, path)];
+  const fields = [...run.fields, measured, ...madeFields(pipeline, path).filter((field) => isLookedAt(field, path))];
   const isFirst = ({ name }: { name: string }, index: number): boolean => fields.findIndex((field) => field.name === name) === index;
   return { ...run, fields: fields.filter(isFirst), monitors: monitorsAt(run, pipeline, replaced, path) };
 }

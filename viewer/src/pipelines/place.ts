@@ -4,6 +4,9 @@ import type { Json } from "../connection/protocol";
 /** The way from the outermost value: keys and indices. */
 export type Path = readonly (string | number)[];
 
+/** A part of a text, from its first character to the one behind its last. */
+export interface Range { from: number; to: number }
+
 export interface Place {
   /** The way to the value that is written here, or of a key to the object that it is in. */
   path: Path;
@@ -148,7 +151,7 @@ function put(root: Json, path: Path, value: Json): void {
 }
 
 /** The token at a line and column, counted from 1 in characters as the checker does. Of an object or a list it is the bracket. */
-export function tokenRange(text: string, line: number, column: number): { from: number; to: number } {
+export function tokenRange(text: string, line: number, column: number): Range {
   let start = 0;
   for (let at = 1; at < line; at++) {
     const end = text.indexOf("\n", start);
@@ -164,7 +167,7 @@ export function tokenRange(text: string, line: number, column: number): { from: 
 }
 
 /** The token of the value, or else of the last key, that is found along a path; null where not even its beginning is there. */
-export function rangeOf(text: string, path: Path): { from: number; to: number } | null {
+export function rangeOf(text: string, path: Path): Range | null {
   let best: { from: number; to: number; depth: number } | null = null;
   walk(text, (token, levels) => {
     const level = levels.at(-1);
@@ -186,3 +189,7 @@ export function rangeOf(text: string, path: Path): { from: number; to: number } 
 export function readPath(text: string): (string | number)[] {
   return [...text.matchAll(/\[(\d+)\]|([^.[\]]+)/g)].map(([, index, key]) => (index === undefined ? key! : Number(index)));
 }
+
+/** A path as errors write it. */
+export const writePath = (path: Path): string =>
+  path.map((step, index) => (typeof step === "number" ? `[${step}]` : index === 0 ? step : `.${step}`)).join("");

@@ -78,13 +78,17 @@ function stagesBefore(stages: readonly Json[], [part, index]: Path): readonly Js
   return part === "stages" && typeof index === "number" ? stages.slice(0, index) : stages;
 }
 
-/** The fields that a name at a path of a pipeline may mean because its stages make them. */
+/** The fields that stages of a pipeline have made for what stands at a path. */
 export function madeFields(pipeline: Json, path: Path): MadeField[] {
   const stages = stagesOf(pipeline);
-  const stage = path[2];
   // What is selected is heeded from the first stage to the last.
-  const made = (stage === "select" ? stages : stagesBefore(stages, path)).flatMap(fieldsOf);
-  return made.filter(({ of }) => (stage === "statistics" ? of === "mesh" : stage === "render" || of !== "pictures"));
+  return (path[2] === "select" ? stages : stagesBefore(stages, path)).flatMap(fieldsOf);
+}
+
+/** Whether what stands at a path looks at a field: statistics are of the mesh alone. */
+export function isLookedAt({ of }: MadeField, path: Path): boolean {
+  const stage = path[2];
+  return stage === "statistics" ? of === "mesh" : stage === "render" || of !== "pictures";
 }
 
 /** The monitors that a name at a path of a pipeline may mean because its stages measure them. */

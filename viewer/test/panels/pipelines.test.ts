@@ -111,6 +111,46 @@ describe("the pipelines of a run", () => {
     expect([at("pipeline-told").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
   });
 
+  it("are warned of where they name what nobody has, and can be applied all the same", async () => {
+    act("health", "load").click();
+    await settle();
+    const state = () => [at("pipeline-state").textContent, at("pipeline-state").dataset.tone, at("pipeline-apply").disabled, FakeEditor.made.marks.length];
+    const write = async (field: string, more = ""): Promise<void> => {
+      FakeEditor.made.surroundings.written(`{"name": "health", ${more}"stages": [{"statistics": {"field": "${field}"}}]}`);
+      await settle();
+    };
+    await write("presure");
+    expect(state()).toEqual(["No errors, 1 warning.", "warning", false, 1]);
+    expect(document.querySelector("#pipeline-errors li.warning .title")?.textContent).toBe("stages[0].statistics.field: neither the run nor a stage before has a field “presure”; did you mean pressure?");
+    document.querySelector<HTMLElement>('#pipeline-errors [data-act="fix"]')!.click();
+    expect(FakeEditor.made.replace).toHaveBeenCalledWith(55, 64, '"pressure"');
+    // What is told of the run later counts at once.
+    made.greet({ fields: [{ name: "presure", association: "vertex", components: 1 }] });
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    made.greet({ fields: [] });
+    await write("nothing");
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    made.greet({ channel: "fluid" });
+    await write("nothing", '"channel": "solid", ');
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    await write("nothing", '"channel": "fluid", ');
+    expect(state()).toEqual(["No errors, 1 warning.", "warning", false, 1]);
+    // Where there are errors it may be they that are to blame; and without a checker nobody knows whether there are.
+    answer = { errors: [{ line: 1, column: 2, path: "name", message: "found nothing", suggestion: null }], more: 0 };
+    await write("nothing");
+    expect(state()).toEqual(["1 error.", "bad", true, 1]);
+    answer = { failure: "no module" };
+    await write("nothing ");
+    expect(state()).toEqual(["Not checked here (no module): the run checks it.", "good", false, 0]);
+  });
+
+  it("are not warned of as the run has them", async () => {
+    known({ name: "later", stages: [{ statistics: { field: "nothing" } }] });
+    act("later", "load").click();
+    await settle();
+    expect([at("pipeline-state").textContent, FakeEditor.made.marks]).toEqual(["No errors.", []]);
+  });
+
   it("are refused in words, with a mark where that is", async () => {
     act("health", "load").click();
     await settle();
