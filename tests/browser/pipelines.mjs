@@ -41,7 +41,7 @@ const behind = async (part) => {
   // The editor hears of it a moment later.
   await page.waitForTimeout(50);
 };
-const told = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-told").textContent.includes(said), words);
+const outcome = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-outcome").textContent.includes(said), words);
 
 const steps = [
   ["the list says what each pipeline does, and what it costs", async () => {
@@ -94,7 +94,7 @@ const steps = [
     await checked("No errors.");
     await clean(anna, "editor");
     await page.keyboard.press("Control+Enter");
-    await told("applied at cycle");
+    await outcome("applied at cycle");
     await anna.until("the view", ({ views }) => views.slice?.triangles > 0);
     check(!(await names(anna)).includes(undefined) && (await names(anna)).includes("slice"), `the run has ${await names(anna)}`);
     await anna.picture("applied");
@@ -107,7 +107,7 @@ const steps = [
     check(/stages\[0\]\.slice\.norma: found the unknown key “norma”.*did you mean normal\?/.test(await anna.text("#pipeline-errors")), `it says ${await anna.text("#pipeline-errors")}`);
     check(await page.isDisabled("#pipeline-apply"), "Apply is on with an error");
     await page.keyboard.press("Control+Enter");
-    check(!(await anna.text("#pipeline-told")).includes("sent"), "it was sent all the same");
+    check(!(await anna.text("#pipeline-outcome")).includes("sent"), "it was sent all the same");
     await anna.picture("misspelt");
     await clean(anna, "with an error");
     await page.click('#pipeline-errors [data-act="fix"]');
@@ -126,7 +126,7 @@ const steps = [
     await anna.picture("warned");
     await clean(anna, "with a warning");
     await page.keyboard.press("Control+Enter");
-    await told("The run refused it:");
+    await outcome("The run refused it:");
     await anna.holds("the mark", () => document.querySelector(".cm-lintRange-error")?.textContent === '"pressur"');
     check(await page.locator("#pipeline-errors li").count() === 1, `it says twice ${await anna.text("#pipeline-errors")}`);
     await anna.picture("refused");
@@ -223,7 +223,7 @@ const steps = [
     await anna.picture("question");
     await clean(anna, "question");
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
-    await told("slice is removed at cycle");
+    await outcome("slice is removed at cycle");
     await anna.holds("a list without it", () => !window.tombolo.pipelines.some(({ name }) => name === "slice"));
     await carl.holds("the watcher's too", () => !window.tombolo.pipelines.some(({ name }) => name === "slice"));
     await anna.picture("removed");

@@ -332,7 +332,7 @@ function takeMessage(message: ServerMessage): void {
     // The hello that comes with it says what there is now.
     case "pipelines":
       if (message.body.status === "applied") pipelines.answered(message.body.id);
-      return store.dispatch({ type: "pipelines told", change: message.body });
+      return store.dispatch({ type: "pipelines outcome", change: message.body });
     // The status shows what it has changed.
     case "done": return;
     case "play": return store.dispatch({ type: "played", played: message.body });

@@ -74,13 +74,22 @@ function walk(text: string, seen: (token: Token, levels: readonly Level[]) => bo
 const pathOf = (levels: readonly Level[]): (string | number)[] =>
   levels.flatMap<string | number>(({ kind, key, index }) => (kind === "array" ? [index] : key === null ? [] : [key]));
 
+/** A token of text with both its quotes. */
+const CLOSED = /^"(?:[^"\\]|\\.)*"$/;
+
+/** Whether what is typed at an offset belongs to a token: behind its first character, and behind its last where no quote has closed it. */
+function isInside(text: string, { kind, from, to }: Token, offset: number): boolean {
+  if (kind === "sign" || offset <= from || offset > to) return false;
+  return offset < to || !CLOSED.test(text.slice(from, to));
+}
+
 /** What is written at an offset of a text; null where nothing can be, such as behind a value. */
 export function placeAt(text: string, offset: number): Place | null {
   let found: Omit<Place, "keys"> | null = null;
   let depth = 0;
   const others: string[] = [];
   let isOver = false;
-  const note = (levels: readonly Level[], from: number, to: number): void => {
+  const note = (levels: readonly Level[], { from, to }: Range): void => {
     isOver = true;
     const level = levels.at(-1);
     const hasColon = text[tokenAt(text, to)?.from ?? -1] === ":";
@@ -99,10 +108,12 @@ export function placeAt(text: string, offset: number): Place | null {
   // On from there the rest of the object is looked at, for its other keys.
   const levels = walk(text, (token, levels) => {
     if (!isOver) {
-      const isIn = token.kind !== "sign" && token.from < offset && (offset < token.to || (offset === token.to && (token.kind === "plain" || text[token.to - 1] !== '"' || token.to - token.from === 1)));
-      if (isIn) note(levels, token.from, token.to);
-      else if (token.from >= offset) note(levels, offset, offset);
-      if (!isOver || isIn || found === null) return isOver && found === null;
+      const isIn = isInside(text, token, offset);
+      if (!isIn && token.from < offset) return false;
+      note(levels, isIn ? token : { from: offset, to: offset });
+      if (found === null) return true;
+      // It is none of the other keys itself.
+      if (isIn) return false;
     }
     if (levels.length < depth) return true;
     const level = levels.at(-1);
@@ -111,7 +122,7 @@ export function placeAt(text: string, offset: number): Place | null {
     }
     return false;
   });
-  if (!isOver) note(levels, offset, offset);
+  if (!isOver) note(levels, { from: offset, to: offset });
   return found === null ? null : { ...(found as Omit<Place, "keys">), keys: [...new Set(others)] };
 }
 

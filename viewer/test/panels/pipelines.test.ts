@@ -41,7 +41,7 @@ describe("the pipelines of a run", () => {
   const row = (name: string): HTMLElement => [...document.querySelectorAll<HTMLElement>("#pipelines li")].find(({ dataset }) => dataset.pipeline === name)!;
   const act = (name: string, kind: string): HTMLElement => row(name).querySelector<HTMLElement>(`[data-act="${kind}"]`)!;
   const last = (): { id: string; [key: string]: unknown } => made.sent.at(-1) as never;
-  const told = (status: "accepted" | "applied", id = last().id): void => made.store.dispatch({ type: "pipelines told", change: { id, status, cycle: 130 } });
+  const outcome = (status: "accepted" | "applied", id = last().id): void => made.store.dispatch({ type: "pipelines outcome", change: { id, status, cycle: 130 } });
   const known = (...pipelines: Pipeline[]): void => made.store.dispatch({ type: "pipelines known", pipelines });
   const settle = async (): Promise<void> => { await vi.advanceTimersByTimeAsync(200); };
   const draft = () => made.store.state.pipelines.drafts[made.store.state.pipelines.open ?? ""];
@@ -104,11 +104,11 @@ describe("the pipelines of a run", () => {
     await settle();
     FakeEditor.made.surroundings.apply();
     expect(last()).toMatchObject({ pipelines: { set: [{ name: "cut", stages: [] }] } });
-    told("accepted");
-    expect(at("pipeline-told").textContent).toMatch(/^The run has taken it/);
-    told("applied");
+    outcome("accepted");
+    expect(at("pipeline-outcome").textContent).toMatch(/^The run has taken it/);
+    outcome("applied");
     known({ name: "cut", stages: [] }, health);
-    expect([at("pipeline-told").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
+    expect([at("pipeline-outcome").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
   });
 
   it("are warned of where they name what nobody has, and can be applied all the same", async () => {
@@ -158,7 +158,7 @@ describe("the pipelines of a run", () => {
     await settle();
     at("pipeline-apply").click();
     made.store.dispatch({ type: "pipelines refused", id: last().id, text: "pipeline `health`: there is no field 'presure'; did you mean 'pressure'?" });
-    expect(at("pipeline-told").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
+    expect(at("pipeline-outcome").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
     expect(FakeEditor.made.marks).toMatchObject([{ fix: { name: "pressure", insert: '"pressure"' } }]);
   });
 
@@ -169,7 +169,7 @@ describe("the pipelines of a run", () => {
     await settle();
     at("pipeline-apply").click();
     expect(last()).toMatchObject({ pipelines: { all: [{ name: "across", stages: [] }, health] } });
-    told("applied");
+    outcome("applied");
     known({ name: "across", stages: [] }, health);
     FakeEditor.made.surroundings.leave();
     act("health", "duplicate").click();
@@ -204,7 +204,7 @@ describe("the pipelines of a run", () => {
     act("cut", "remove").click();
     expect(last()).toMatchObject({ pipelines: { remove: ["cut"] } });
     made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
-    expect(at("pipeline-told").textContent).toMatch(/^The connection was lost/);
+    expect(at("pipeline-outcome").textContent).toMatch(/^The connection was lost/);
   });
 
   it("begin with a template, in a menu that the keyboard opens and closes", async () => {

@@ -24,11 +24,14 @@ describe("where something is written", () => {
     expect(at('{"stages": [|]}')).toMatchObject({ path: ["stages", 0], part: "value", from: 12, to: 12 });
     expect(at('{"every": |}')).toMatchObject({ path: ["every"], part: "value" });
     expect(at("|")).toMatchObject({ path: [], part: "value" });
+    // A quote that is escaped closes nothing.
+    expect(at('{"name": "a\\"|')).toMatchObject({ path: ["name"], part: "value", from: 9, to: 13 });
   });
 
   it("is nowhere where nothing can be", () => {
     expect(at('{"a" |')).toBeNull();
     expect(at('{"a": 1 |}')).toBeNull();
+    expect(at('{"a": "b"|}')).toBeNull();
     expect(at("{} |")).not.toBeUndefined();
   });
 
