@@ -42,6 +42,17 @@ const behind = async (part) => {
   await page.waitForTimeout(50);
 };
 const outcome = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-outcome").textContent.includes(said), words);
+/** Has the messages that list the views, but for the first, come later than the frames after them. */
+const listLate = (page) => page.routeWebSocket(/\/ws/, (browserSide) => {
+  const server = browserSide.connectToServer();
+  let isFirst = true;
+  server.onMessage((message) => {
+    const isList = typeof message === "string" && message.startsWith('{"hello"');
+    if (isList && !isFirst) setTimeout(() => browserSide.send(message), 1500);
+    else browserSide.send(message);
+    if (isList) isFirst = false;
+  });
+});
 
 const steps = [
   ["the list says what each pipeline does, and what it costs", async () => {
@@ -203,6 +214,7 @@ const steps = [
     const address = await page.evaluate(() => navigator.clipboard.readText());
     await page.keyboard.press("Escape");
     carl = await Viewer.open(browser, "carl");
+    await listLate(carl.page);
     await carl.page.goto(address);
     await carl.until("a picture", (seen) => seen.connection === "connected" && seen.frames > 0);
     check(await carl.page.isDisabled("#pipeline-add"), "a watcher may add");
@@ -217,6 +229,15 @@ const steps = [
     check(await carl.page.isDisabled("#pipeline-apply"), "a watcher may apply");
     await carl.picture("watching");
     await clean(carl, "watching");
+  }],
+  ["a view is seen whose first frame comes before the view is listed", async () => {
+    await page.click('#pipelines li[data-pipeline="slice"] [data-act="duplicate"]');
+    await page.waitForSelector("#pipeline-text .cm-content");
+    await checked("No errors.");
+    await page.keyboard.press("Control+Enter");
+    await outcome("applied at cycle");
+    await carl.until("the view", ({ views }) => views["slice 2"]?.triangles > 0);
+    await page.keyboard.press("Escape");
   }],
   ["a pipeline is removed once that is confirmed", async () => {
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
