@@ -3,14 +3,14 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
-import { COLOURS, axesOf, labelled, padded } from "./plotting";
+import { SERIES_COLOURS, axesOf, labelled, padded, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
 import { ValueTable } from "./table";
 
 /** The most series that are drawn at once: one for each colour. */
-const DRAWN = COLOURS.length;
+const DRAWN = SERIES_COLOURS;
 /** The most axes that stand beside the plot. */
 const AXES = 4;
 /** The lines in which the names of orders stand. */
@@ -130,7 +130,7 @@ export class HistoryPlot implements Tab {
         },
       });
       box.checked = position >= 0;
-      box.style.accentColor = COLOURS[position] ?? "";
+      if (position >= 0) box.style.accentColor = seriesStyle(position);
       return element("label", { title: `pipeline ${one.source}` }, box, label(one));
     }));
     if (focused) this.choices.querySelector<HTMLElement>(`[data-series="${CSS.escape(focused)}"]`)?.focus();
@@ -138,7 +138,7 @@ export class HistoryPlot implements Tab {
 
   private make(series: readonly Series[], data: uPlot.AlignedData): uPlot {
     const scales = [...new Set(series.map(scaleOf))];
-    const colour = (at: number): string => COLOURS[at % COLOURS.length]!;
+    const colour = (at: number): (() => string) => seriesColour(this.body, at);
     const { grid, axis } = axesOf(this.body);
     const { width, height } = this.size();
     return new uPlot({
@@ -195,7 +195,7 @@ export class HistoryPlot implements Tab {
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
     const style = getComputedStyle(this.body);
-    ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--accent");
+    ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--pressed");
     ctx.font = `${11 * devicePixelRatio}px sans-serif`;
     ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
     ctx.textAlign = "left";
@@ -231,7 +231,7 @@ export class HistoryPlot implements Tab {
       order = found.order ?? order;
       const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
       const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      return { name: one ? label(one) : "", colour: COLOURS[i] ?? "", cells };
+      return { name: one ? label(one) : "", colour: seriesStyle(i), cells };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
     write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);

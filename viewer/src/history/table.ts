@@ -20,9 +20,12 @@ export class ValueTable {
   constructor(private readonly headings: readonly string[], caption: Node | null = null) {
     const titles = [element("td"), ...headings.map((text) => element("th", { scope: "col" }, text))];
     this.element = element("table", {}, caption && element("caption", {}, caption), element("thead", {}, element("tr", {}, ...titles)), this.body);
+    this.show([]);
   }
 
   show(rows: readonly Row[]): void {
+    // Headings alone say nothing.
+    this.element.tHead!.hidden = rows.length === 0;
     for (const { row } of this.rows.splice(rows.length)) row.remove();
     for (const [index, { name, colour, cells }] of rows.entries()) {
       const parts = this.rows[index] ?? this.append();

@@ -6,7 +6,7 @@ import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 import type { Tab } from "./dock";
-import { COLOURS } from "./plotting";
+import { seriesStyle } from "./plotting";
 import { ValueTable } from "./table";
 
 /** The least, mean and largest of some values. */
@@ -57,7 +57,7 @@ export abstract class ValuePlot implements Tab {
   /** Fills the table; null where there is nothing of that moment. */
   protected fill(now: Spread | null, before: Spread | null, earlier: string): void {
     const rows = [{ name: "now", spread: now }, { name: earlier, spread: before }].map(({ name, spread }, i) =>
-      (spread ? { name, colour: COLOURS[i]!, cells: spread.map((value) => digits(value)) } : null));
+      (spread ? { name, colour: seriesStyle(i), cells: spread.map((value) => digits(value)) } : null));
     this.table.show(rows.filter((row) => row !== null));
   }
 

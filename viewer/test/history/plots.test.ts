@@ -36,7 +36,9 @@ describe("the plots below the picture", () => {
     for (const [theme, line, soft] of [["dark", "#333", "#aaa"], ["light", "#ddd", "#555"]] as const) {
       document.body.style.setProperty("--line", line);
       document.body.style.setProperty("--soft", soft);
+      document.body.style.setProperty("--plot-1", soft);
       expect(colours(), theme).toEqual([soft, line, line, soft, line, line]);
+      expect((options.series[1]!.stroke as () => unknown)()).toBe(soft);
     }
     expect(redraw).not.toHaveBeenCalled();
     dock.recolour();

@@ -19,8 +19,9 @@ describe("the table beside a plot", () => {
     table.show([row("now", "5", "2")]);
     expect(said()).toEqual([["now", "5", "2"]]);
     expect(table.element.querySelector<HTMLElement>(".colour")!.style.background).toBe("rgb(1, 2, 3)");
+    expect(table.element.tHead!.hidden).toBe(false);
     table.show([]);
-    expect(said()).toEqual([]);
+    expect([said(), table.element.tHead!.hidden]).toEqual([[], true]);
   });
 
   it("keeps what is chosen in it while numbers beside it change", () => {
