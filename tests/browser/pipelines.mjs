@@ -20,6 +20,13 @@ const clean = async (viewer, state) => {
 };
 const checked = (state) => anna.holds(`"${state}" below the text`, (said) => document.getElementById("pipeline-state").textContent === said, state);
 const options = () => page.locator(".cm-tooltip-autocomplete li").evaluateAll((found) => found.map((one) => one.querySelector(".cm-completionLabel").textContent));
+/** Takes the first of what the completion offers, which begins with a text. */
+const take = async (label) => {
+  await anna.holds(`${label} is offered`, (begin) => document.querySelector(".cm-tooltip-autocomplete li[aria-selected]")?.textContent.startsWith(begin), label);
+  // The list takes no key in its first moment.
+  await page.waitForTimeout(150);
+  await page.keyboard.press("Enter");
+};
 /** Puts the cursor behind a part of the text. */
 const behind = async (part) => {
   const found = await page.evaluate((wanted) => {
@@ -87,17 +94,14 @@ const steps = [
     await behind("{ \"stream\"");
     for (const key of ["ArrowUp", "End", "Enter"]) await page.keyboard.press(key);
     await page.keyboard.type('{ "sel');
-    await anna.holds("select", () => [...document.querySelectorAll(".cm-tooltip-autocomplete li")].some((one) => one.textContent.startsWith("select")));
-    await page.waitForTimeout(150);
-    await page.keyboard.press("Enter");
+    await take("select");
     await anna.holds("the fields' list", () => /"select": \{ "fields": \[/.test(document.querySelector("#pipeline-text .cm-content").textContent));
     await page.keyboard.press("Control+Space");
     await anna.holds("the run's fields", () => [...document.querySelectorAll(".cm-tooltip-autocomplete li")].some((one) => one.textContent.startsWith("pressure")));
     await anna.picture("fields");
     await page.waitForTimeout(150);
     await page.keyboard.type('"press');
-    await page.waitForTimeout(400);
-    await page.keyboard.press("Enter");
+    await take("pressure");
     await anna.holds("the field", () => /"fields": \["pressure"\]/.test(document.querySelector("#pipeline-text .cm-content").textContent));
     await behind('["pressure"] }');
     await page.keyboard.press("End");
@@ -140,6 +144,7 @@ const steps = [
     await outcome("The run refused it:");
     await anna.holds("the mark", () => document.querySelector(".cm-lintRange-error")?.textContent === '"pressur"');
     check(await page.locator("#pipeline-errors li").count() === 1, `it says twice ${await anna.text("#pipeline-errors")}`);
+    await checked("Refused by the run.");
     await anna.picture("refused");
     await page.click('#pipeline-errors [data-act="fix"]');
     await checked("No errors.");
@@ -154,8 +159,7 @@ const steps = [
     await page.keyboard.type(', "slo');
     await anna.holds("the derived field", () => /^slope.*field/.test(document.querySelector(".cm-tooltip-autocomplete li")?.textContent));
     await anna.picture("derived");
-    await page.waitForTimeout(150);
-    await page.keyboard.press("Enter");
+    await take("slope");
     await checked("No errors.");
     check((await text()).includes('["pressure", "slope"]'), `the text is ${await text()}`);
     await page.click("#pipeline-revert");

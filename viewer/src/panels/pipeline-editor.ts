@@ -80,7 +80,8 @@ export class PipelineEditorPanel {
     write(part("pipeline-title"), draft.replaced ?? "New pipeline");
     const isWaiting = asked !== null && asked.key === open && (asked.state === "sent" || asked.state === "accepted");
     const errors = draft.checked?.errors ?? [];
-    const refusal = asked !== null && asked.key === open && asked.state === "refused" && asked.text === draft.text ? refusalMark(draft.text, asked.reason) : null;
+    const isRefused = asked !== null && asked.key === open && asked.state === "refused" && asked.text === draft.text;
+    const refusal = isRefused ? refusalMark(draft.text, asked.reason) : null;
     const warnings = this.warnings(draft).filter(({ from, to }) => !refusal || to <= refusal.from || from >= refusal.to);
     this.marks = [...errors.map((error) => markOf(draft.text, error)), ...(refusal ? [refusal] : []), ...warnings];
     this.showMarks(refusal, draft.checked?.more ?? 0);
@@ -90,8 +91,8 @@ export class PipelineEditorPanel {
     apply.disabled = whyNot !== "";
     apply.title = whyNot || "Ctrl+Enter";
     (part("pipeline-revert") as HTMLButtonElement).disabled = !isChanged(draft);
-    write(part("pipeline-state"), this.stateText(draft.checked !== null, errors.length + (draft.checked?.more ?? 0), warnings.length, why));
-    part("pipeline-state").dataset.tone = errors.length > 0 ? "bad" : warnings.length > 0 ? "warning" : "good";
+    write(part("pipeline-state"), this.stateText(draft.checked !== null, errors.length + (draft.checked?.more ?? 0), warnings.length, why === "" && isRefused ? "Refused by the run." : why));
+    part("pipeline-state").dataset.tone = errors.length > 0 || isRefused ? "bad" : warnings.length > 0 ? "warning" : "good";
     if (this.editor) {
       this.editor.show(draft.text, why !== "");
       this.editor.mark(this.marks);

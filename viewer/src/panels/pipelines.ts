@@ -75,7 +75,7 @@ export class PipelinesPanel {
     return element("li", { "data-pipeline": name },
       element("button", { type: "button", class: "load", "data-act": "load", title: why === "" ? "Edit it" : "Read it", onclick: () => this.open(pipeline) },
         element("span", { class: "title" }, name, draft && isChanged(draft) ? element("span", { class: "chip" }, "draft") : null),
-        element("span", { class: "detail" }, purpose(pipeline)),
+        element("span", { class: "detail", title: purpose(pipeline) }, purpose(pipeline)),
         element("span", { class: "detail cost" }, cadence(pipeline))),
       act("duplicate", "", "Duplicate", () => this.duplicate(pipeline)),
       act("remove", "×", "Remove", () => this.ask(name)));

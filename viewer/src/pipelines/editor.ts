@@ -60,6 +60,8 @@ const THEME = EditorView.theme({
   ".cm-tooltip.cm-completionInfo": { padding: "6px 9px", maxWidth: "280px", lineHeight: "1.4" },
   ".cm-diagnostic": { padding: "5px 9px", maxWidth: "340px" },
   ".cm-diagnostic-error": { borderLeftColor: "var(--bad)" },
+  ".cm-lint-marker-error": { content: "normal", backgroundColor: "var(--bad)", borderRadius: "50%" },
+  ".cm-lint-marker-warning": { content: "normal", backgroundColor: "var(--low)", clipPath: "polygon(50% 0, 100% 100%, 0 100%)" },
   ".cm-diagnostic-warning": { borderLeftColor: "var(--low)" },
   ".cm-diagnosticAction": { backgroundColor: "var(--raised)", color: "var(--text)", border: "1px solid var(--line)", minHeight: "24px" },
   ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy var(--bad) 1.5px", textUnderlineOffset: "3px" },

@@ -160,6 +160,7 @@ describe("the pipelines of a run", () => {
     made.store.dispatch({ type: "pipelines refused", id: last().id, text: "pipeline `health`: there is no field 'presure'; did you mean 'pressure'?" });
     expect(at("pipeline-outcome").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
     expect(FakeEditor.made.marks).toMatchObject([{ fix: { name: "pressure", insert: '"pressure"' } }]);
+    expect([at("pipeline-state").textContent, at("pipeline-state").dataset.tone]).toEqual(["Refused by the run.", "bad"]);
   });
 
   it("take another name in one change, and are added under a free one", async () => {
