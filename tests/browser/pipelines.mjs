@@ -20,6 +20,13 @@ const clean = async (viewer, state) => {
 };
 const checked = (state) => anna.holds(`"${state}" below the text`, (said) => document.getElementById("pipeline-state").textContent === said, state);
 const options = () => page.locator(".cm-tooltip-autocomplete li").evaluateAll((found) => found.map((one) => one.querySelector(".cm-completionLabel").textContent));
+/** Takes the first of what the completion offers, which begins with a text. */
+const take = async (label) => {
+  await anna.holds(`${label} is offered`, (begin) => document.querySelector(".cm-tooltip-autocomplete li[aria-selected]")?.textContent.startsWith(begin), label);
+  // The list takes no key in its first moment.
+  await page.waitForTimeout(150);
+  await page.keyboard.press("Enter");
+};
 /** Puts the cursor behind a part of the text. */
 const behind = async (part) => {
   const found = await page.evaluate((wanted) => {
@@ -41,7 +48,18 @@ const behind = async (part) => {
   // The editor hears of it a moment later.
   await page.waitForTimeout(50);
 };
-const told = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-told").textContent.includes(said), words);
+const outcome = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-outcome").textContent.includes(said), words);
+/** Has the messages that list the views, but for the first, come later than the frames after them. */
+const listLate = (page) => page.routeWebSocket(/\/ws/, (browserSide) => {
+  const server = browserSide.connectToServer();
+  let isFirst = true;
+  server.onMessage((message) => {
+    const isList = typeof message === "string" && message.startsWith('{"hello"');
+    if (isList && !isFirst) setTimeout(() => browserSide.send(message), 1500);
+    else browserSide.send(message);
+    if (isList) isFirst = false;
+  });
+});
 
 const steps = [
   ["the list says what each pipeline does, and what it costs", async () => {
@@ -76,17 +94,14 @@ const steps = [
     await behind("{ \"stream\"");
     for (const key of ["ArrowUp", "End", "Enter"]) await page.keyboard.press(key);
     await page.keyboard.type('{ "sel');
-    await anna.holds("select", () => [...document.querySelectorAll(".cm-tooltip-autocomplete li")].some((one) => one.textContent.startsWith("select")));
-    await page.waitForTimeout(150);
-    await page.keyboard.press("Enter");
+    await take("select");
     await anna.holds("the fields' list", () => /"select": \{ "fields": \[/.test(document.querySelector("#pipeline-text .cm-content").textContent));
     await page.keyboard.press("Control+Space");
     await anna.holds("the run's fields", () => [...document.querySelectorAll(".cm-tooltip-autocomplete li")].some((one) => one.textContent.startsWith("pressure")));
     await anna.picture("fields");
     await page.waitForTimeout(150);
     await page.keyboard.type('"press');
-    await page.waitForTimeout(400);
-    await page.keyboard.press("Enter");
+    await take("pressure");
     await anna.holds("the field", () => /"fields": \["pressure"\]/.test(document.querySelector("#pipeline-text .cm-content").textContent));
     await behind('["pressure"] }');
     await page.keyboard.press("End");
@@ -94,7 +109,7 @@ const steps = [
     await checked("No errors.");
     await clean(anna, "editor");
     await page.keyboard.press("Control+Enter");
-    await told("applied at cycle");
+    await outcome("applied at cycle");
     await anna.until("the view", ({ views }) => views.slice?.triangles > 0);
     check(!(await names(anna)).includes(undefined) && (await names(anna)).includes("slice"), `the run has ${await names(anna)}`);
     await anna.picture("applied");
@@ -107,24 +122,48 @@ const steps = [
     check(/stages\[0\]\.slice\.norma: found the unknown key “norma”.*did you mean normal\?/.test(await anna.text("#pipeline-errors")), `it says ${await anna.text("#pipeline-errors")}`);
     check(await page.isDisabled("#pipeline-apply"), "Apply is on with an error");
     await page.keyboard.press("Control+Enter");
-    check(!(await anna.text("#pipeline-told")).includes("sent"), "it was sent all the same");
+    check(!(await anna.text("#pipeline-outcome")).includes("sent"), "it was sent all the same");
     await anna.picture("misspelt");
     await clean(anna, "with an error");
     await page.click('#pipeline-errors [data-act="fix"]');
     await checked("No errors.");
     check((await text()).includes('"normal"'), `the text is ${await text()}`);
   }],
-  ["what the run alone can know is marked once it has refused it", async () => {
+  ["a field that nobody has is warned of with the nearest name, and the run has the last word", async () => {
     await behind('"pressure');
     await page.keyboard.press("Backspace");
-    await checked("No errors.");
+    await checked("No errors, 1 warning.");
+    await anna.holds("the mark", () => document.querySelector(".cm-lintRange-warning")?.textContent === '"pressur"');
+    check(/select\.fields\[0\]: neither the run nor a stage before has a field “pressur”; did you mean pressure\?/.test(await anna.text("#pipeline-errors .warning")), `it says ${await anna.text("#pipeline-errors")}`);
+    check(await page.isEnabled("#pipeline-apply"), "a warning keeps the pipeline from being applied");
+    await page.keyboard.press("F8");
+    await anna.holds("the warning at the cursor", () => /neither the run/.test(document.querySelector(".cm-panel-lint, .cm-tooltip-lint, .cm-diagnostic-warning")?.textContent ?? ""));
+    await anna.picture("warned");
+    await clean(anna, "with a warning");
     await page.keyboard.press("Control+Enter");
-    await told("The run refused it:");
+    await outcome("The run refused it:");
     await anna.holds("the mark", () => document.querySelector(".cm-lintRange-error")?.textContent === '"pressur"');
+    check(await page.locator("#pipeline-errors li").count() === 1, `it says twice ${await anna.text("#pipeline-errors")}`);
+    await checked("Refused by the run.");
     await anna.picture("refused");
     await page.click('#pipeline-errors [data-act="fix"]');
     await checked("No errors.");
     check(await page.isDisabled("#pipeline-apply"), "what is there already can be applied again");
+  }],
+  ["a field that an earlier stage derives is completed, and not warned of", async () => {
+    await behind('"stages": [');
+    await page.keyboard.press("Enter");
+    await page.keyboard.type('{ "gradient": { "field": "pressure", "name": "slope" } },');
+    await checked("No errors.");
+    await behind('["pressure"');
+    await page.keyboard.type(', "slo');
+    await anna.holds("the derived field", () => /^slope.*field/.test(document.querySelector(".cm-tooltip-autocomplete li")?.textContent));
+    await anna.picture("derived");
+    await take("slope");
+    await checked("No errors.");
+    check((await text()).includes('["pressure", "slope"]'), `the text is ${await text()}`);
+    await page.click("#pipeline-revert");
+    await checked("No errors.");
   }],
   ["a draft is kept when the editor is left, Tab leaves the text, and all is reached by keyboard", async () => {
     await page.keyboard.press("Escape");
@@ -179,6 +218,7 @@ const steps = [
     const address = await page.evaluate(() => navigator.clipboard.readText());
     await page.keyboard.press("Escape");
     carl = await Viewer.open(browser, "carl");
+    await listLate(carl.page);
     await carl.page.goto(address);
     await carl.until("a picture", (seen) => seen.connection === "connected" && seen.frames > 0);
     check(await carl.page.isDisabled("#pipeline-add"), "a watcher may add");
@@ -194,12 +234,21 @@ const steps = [
     await carl.picture("watching");
     await clean(carl, "watching");
   }],
+  ["a view is seen whose first frame comes before the view is listed", async () => {
+    await page.click('#pipelines li[data-pipeline="slice"] [data-act="duplicate"]');
+    await page.waitForSelector("#pipeline-text .cm-content");
+    await checked("No errors.");
+    await page.keyboard.press("Control+Enter");
+    await outcome("applied at cycle");
+    await carl.until("the view", ({ views }) => views["slice 2"]?.triangles > 0);
+    await page.keyboard.press("Escape");
+  }],
   ["a pipeline is removed once that is confirmed", async () => {
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
     await anna.picture("question");
     await clean(anna, "question");
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
-    await told("slice is removed at cycle");
+    await outcome("slice is removed at cycle");
     await anna.holds("a list without it", () => !window.tombolo.pipelines.some(({ name }) => name === "slice"));
     await carl.holds("the watcher's too", () => !window.tombolo.pipelines.some(({ name }) => name === "slice"));
     await anna.picture("removed");

@@ -228,10 +228,6 @@ const following = new Following(store, commands, scene.camera, ({ parallel }) =>
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 new CameraTools(part("tools"), scene);
 const reveal = watchDrawers();
-new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
-  scene.setTheme(theme);
-  compare.setTheme(theme);
-});
 const notes: NotesPanel = new NotesPanel(store, commands, marks, {
   flyTo: (place) => scene.camera.flyTo(place),
   middle: () => {
@@ -256,6 +252,11 @@ const histogramPlot = new HistogramPlot(store, {
 }, earlier);
 const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; });
 for (const tab of [history, linePlot, histogramPlot]) dock.add(tab);
+new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
+  scene.setTheme(theme);
+  compare.setTheme(theme);
+  dock.recolour();
+});
 store.watch((state) => state.frames.count > 0, () => dock.update());
 const barTitle = ({ look: { field, component } }: Bar): string => titleWithUnit(field, component);
 const ink = (): string => getComputedStyle(document.body).color;
@@ -331,7 +332,7 @@ function takeMessage(message: ServerMessage): void {
     // The hello that comes with it says what there is now.
     case "pipelines":
       if (message.body.status === "applied") pipelines.answered(message.body.id);
-      return store.dispatch({ type: "pipelines told", change: message.body });
+      return store.dispatch({ type: "pipelines outcome", change: message.body });
     // The status shows what it has changed.
     case "done": return;
     case "play": return store.dispatch({ type: "played", played: message.body });

@@ -11,6 +11,8 @@ export interface Tab {
   readonly isEmpty: boolean;
   /** It is seen from now on, or no longer. */
   show(shown: boolean): void;
+  /** The page has other colours. */
+  recolour(): void;
 }
 
 interface Known { tab: Tab; button: HTMLButtonElement; tools: HTMLElement }
@@ -69,6 +71,11 @@ export class Dock {
     this.seen = seen;
     before?.show(false);
     seen?.show(true);
+  }
+
+  /** The page has other colours. */
+  recolour(): void {
+    for (const { tab } of this.tabs) tab.recolour();
   }
 
   private open(isOpen: boolean): void {

@@ -7,7 +7,7 @@ import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
-import { COLOURS, axesOf, labelled } from "./plotting";
+import { axesOf, labelled, seriesColour } from "./plotting";
 import { histogram, weighted } from "./profile";
 import type { Weighted } from "./profile";
 import { ValuePlot } from "./value-plot";
@@ -64,12 +64,13 @@ export class HistogramPlot extends ValuePlot {
 
   private make(data: uPlot.AlignedData): uPlot {
     const { axis } = axesOf(this.body);
+    const [now, before] = [seriesColour(this.body, 0), seriesColour(this.body, 1)];
     const paths = uPlot.paths.stepped!({ align: 1 });
     return new uPlot({
       ...this.size(), padding: [10, 12, 0, 0], legend: { show: false }, scales: { x: { time: false }, y: { range: (_, __, high) => [0, 1.05 * (high ?? 1) || 1] } },
       series: [
-        {}, { label: "now", stroke: COLOURS[0]!, fill: `${COLOURS[0]}44`, width: 1.5, paths, points: { show: false } },
-        { label: "before", stroke: COLOURS[1]!, width: 1.5, dash: [6, 4], paths, points: { show: false } },
+        {}, { label: "now", stroke: now, fill: () => `${now()}44`, width: 1.5, paths, points: { show: false } },
+        { label: "before", stroke: before, width: 1.5, dash: [6, 4], paths, points: { show: false } },
       ],
       axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: 50, values: (_, ticks) => ticks.map((tick) => `${digits(tick, 3)} %`) }],
     }, data, this.canvas);

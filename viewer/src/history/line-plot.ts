@@ -11,7 +11,7 @@ import { LINE, lineBetween, lineOf } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
-import { COLOURS, axesOf, labelled, padded } from "./plotting";
+import { axesOf, labelled, padded, seriesColour } from "./plotting";
 import { profile, together } from "./profile";
 import type { Profile } from "./profile";
 import { ValuePlot } from "./value-plot";
@@ -33,6 +33,7 @@ export class LinePlot extends ValuePlot {
   private readonly note = element("p", { class: "hint" });
   private readonly ends: Record<"from" | "to", HTMLInputElement[]>;
   private readonly remove: HTMLButtonElement;
+  private readonly csv: HTMLButtonElement;
   private shape = "";
   private profiles: readonly (Profile | null)[] = [];
   private line: { from: Vector; to: Vector } | null = null;
@@ -44,12 +45,12 @@ export class LinePlot extends ValuePlot {
   ) {
     super(store, REST);
     const inputs = (label: string): HTMLInputElement[] => ["x", "y", "z"].map((axis) =>
-      element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, onchange: () => this.typed() }));
+      element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, placeholder: axis, onchange: () => this.typed() }));
     this.ends = { from: inputs("from"), to: inputs("to") };
     const row = (label: "from" | "to"): HTMLElement => element("div", { class: "ends" }, element("span", {}, label), ...this.ends[label]);
-    const csv = element("button", { type: "button", class: "small", title: "What is plotted, as comma-separated values", onclick: () => this.download() }, "CSV");
+    this.csv = element("button", { type: "button", class: "small", title: "What is plotted, as comma-separated values", onclick: () => this.download() }, "CSV");
     this.remove = element("button", { type: "button", class: "small", title: "Takes the line away", onclick: () => pipelines.remove(LINE) }, "Remove");
-    this.tools = [this.heading, csv, this.remove];
+    this.tools = [this.heading, this.csv, this.remove];
     this.values.prepend(row("from"), row("to"));
     this.values.append(this.note);
     pipelines.onChange(() => this.follow());
@@ -83,7 +84,9 @@ export class LinePlot extends ValuePlot {
 
   private say(): void {
     const why = whyNotSteering(this.store.state);
-    for (const control of [...this.ends.from, ...this.ends.to, this.remove]) control.disabled = why !== "";
+    for (const control of [...this.ends.from, ...this.ends.to]) control.disabled = why !== "";
+    this.remove.disabled = why !== "" || this.line === null;
+    this.csv.disabled = this.line === null;
     write(this.note, this.line === null ? "Choose Line in the toolbar and click two places of the picture; or type two points." : why === "" ? "" : `The line is where the run takes it. ${why}`);
     this.note.hidden = this.note.textContent === "";
   }
@@ -130,7 +133,7 @@ export class LinePlot extends ValuePlot {
     return new uPlot({
       ...this.size(), padding: [10, 12, 0, 0], legend: { show: false },
       scales: { x: { time: false }, y: { auto: true, range: padded } },
-      series: [{}, { label: title, stroke: COLOURS[0]!, width: 1.8, points: { show: false } }, { label: "before", stroke: COLOURS[1]!, width: 1.4, dash: [6, 4], points: { show: false } }],
+      series: [{}, { label: title, stroke: seriesColour(this.body, 0), width: 1.8, points: { show: false } }, { label: "before", stroke: seriesColour(this.body, 1), width: 1.4, dash: [6, 4], points: { show: false } }],
       axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: 62, values: labelled }],
     }, data, this.canvas);
   }

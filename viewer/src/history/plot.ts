@@ -3,13 +3,14 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
-import { COLOURS, axesOf, labelled, padded } from "./plotting";
+import { SERIES_COLOURS, axesOf, labelled, padded, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
+import { ValueTable } from "./table";
 
 /** The most series that are drawn at once: one for each colour. */
-const DRAWN = COLOURS.length;
+const DRAWN = SERIES_COLOURS;
 /** The most axes that stand beside the plot. */
 const AXES = 4;
 /** The lines in which the names of orders stand. */
@@ -33,17 +34,16 @@ export class HistoryPlot implements Tab {
   private zoom: [number, number] | null = null;
   private readonly canvas = element("div", { class: "plot" });
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
-  private readonly table = element("tbody");
   private readonly heading = element("span", { class: "hint" });
+  private readonly table = new ValueTable(["value", "before", "difference"], this.heading);
   private readonly whole: HTMLButtonElement;
 
   /** `picked` are the series that were chosen before; null for those that a person who asks for nothing wants to see. */
   constructor(private readonly history: History, private picked: readonly string[] | null, private readonly changed: (picked: readonly string[]) => void) {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     const csv = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
-    const headings = [element("td"), ...["value", "before", "difference"].map((text) => element("th", { scope: "col" }, text))];
     this.body = element("div", { class: "dock-body" }, this.canvas,
-      element("div", { class: "values" }, element("table", {}, element("caption", {}, this.heading), element("thead", {}, element("tr", {}, ...headings)), this.table),
+      element("div", { class: "values" }, this.table.element,
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
     this.tools = [element("span", { class: "hint" }, "drag to zoom · double-click for the whole"), this.whole, csv];
     new ResizeObserver(() => this.resize()).observe(this.canvas);
@@ -56,6 +56,10 @@ export class HistoryPlot implements Tab {
   show(shown: boolean): void {
     this.isShown = shown;
     if (shown) this.draw();
+  }
+
+  recolour(): void {
+    this.plot?.redraw(false);
   }
 
   /** There are new values. */
@@ -126,7 +130,7 @@ export class HistoryPlot implements Tab {
         },
       });
       box.checked = position >= 0;
-      box.style.accentColor = COLOURS[position] ?? "";
+      if (position >= 0) box.style.accentColor = seriesStyle(position);
       return element("label", { title: `pipeline ${one.source}` }, box, label(one));
     }));
     if (focused) this.choices.querySelector<HTMLElement>(`[data-series="${CSS.escape(focused)}"]`)?.focus();
@@ -134,7 +138,7 @@ export class HistoryPlot implements Tab {
 
   private make(series: readonly Series[], data: uPlot.AlignedData): uPlot {
     const scales = [...new Set(series.map(scaleOf))];
-    const colour = (at: number): string => COLOURS[at % COLOURS.length]!;
+    const colour = (at: number): (() => string) => seriesColour(this.body, at);
     const { grid, axis } = axesOf(this.body);
     const { width, height } = this.size();
     return new uPlot({
@@ -191,7 +195,7 @@ export class HistoryPlot implements Tab {
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
     const style = getComputedStyle(this.body);
-    ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--accent");
+    ctx.strokeStyle = ctx.fillStyle = style.getPropertyValue("--pressed");
     ctx.font = `${11 * devicePixelRatio}px sans-serif`;
     ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
     ctx.textAlign = "left";
@@ -227,15 +231,11 @@ export class HistoryPlot implements Tab {
       order = found.order ?? order;
       const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
       const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      // Beside the name, which stays as readable as the rest.
-      const colour = element("span", { class: "colour", "aria-hidden": "true" });
-      colour.style.background = COLOURS[i] ?? "";
-      const name = element("th", { scope: "row" }, colour, one ? label(one) : "");
-      return element("tr", {}, name, ...cells.map((text) => element("td", {}, text)));
+      return { name: one ? label(one) : "", colour: seriesStyle(i), cells };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
     write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
-    this.table.replaceChildren(...rows);
+    this.table.show(rows);
   }
 
   private size(): { width: number; height: number } {

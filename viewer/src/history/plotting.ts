@@ -2,16 +2,24 @@
 import type uPlot from "uplot";
 import { within } from "../number";
 
-/** Told apart by those who do not tell red from green, too (Okabe and Ito, 2008), light enough for a dark ground. */
-export const COLOURS = ["#56b4e9", "#e69f00", "#2fbf96", "#cc79a7", "#f0e442", "#d5763c", "#8f9dff", "#a5adb6"];
+/** A colour that is looked up whenever it is drawn: the theme of the page may be another one by then. */
+type Colour = () => string;
+interface Grid { stroke: Colour; width: number }
 
-interface Grid { stroke: string; width: number }
+const lookedUp = (root: HTMLElement, name: string): Colour => () => getComputedStyle(root).getPropertyValue(name).trim();
+
+/** How many series have a colour of their own. */
+export const SERIES_COLOURS = 8;
+const seriesName = (series: number): string => `--plot-${(series % SERIES_COLOURS) + 1}`;
+/** The colour of a series for what is drawn. */
+export const seriesColour = (root: HTMLElement, series: number): Colour => lookedUp(root, seriesName(series));
+/** The colour of a series for an element of the page. */
+export const seriesStyle = (series: number): string => `var(${seriesName(series)})`;
 
 /** How axes and their grid look, by the theme of the page. */
-export function axesOf(root: HTMLElement): { grid: Grid; axis: { stroke: string; grid: Grid; ticks: Grid; font: string } } {
-  const style = getComputedStyle(root);
-  const grid = { stroke: style.getPropertyValue("--line"), width: 1 };
-  return { grid, axis: { stroke: style.getPropertyValue("--soft"), grid, ticks: grid, font: "11px sans-serif" } };
+export function axesOf(root: HTMLElement): { grid: Grid; axis: { stroke: Colour; grid: Grid; ticks: Grid; font: string } } {
+  const grid = { stroke: lookedUp(root, "--line"), width: 1 };
+  return { grid, axis: { stroke: lookedUp(root, "--soft"), grid, ticks: grid, font: "11px sans-serif" } };
 }
 
 /** A little room above and below; a line that is level lies in the middle. */

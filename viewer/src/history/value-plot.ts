@@ -6,7 +6,8 @@ import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 import type { Tab } from "./dock";
-import { COLOURS } from "./plotting";
+import { seriesStyle } from "./plotting";
+import { ValueTable } from "./table";
 
 /** The least, mean and largest of some values. */
 export type Spread = readonly [least: number, mean: number, largest: number];
@@ -21,14 +22,13 @@ export abstract class ValuePlot implements Tab {
   /** What stands beside the plot: the table. */
   protected readonly values: HTMLElement;
   protected plot: uPlot | null = null;
-  private readonly rows = element("tbody");
+  private readonly table = new ValueTable(["least", "mean", "largest"]);
   private isShown = false;
   private waiting: number | null = null;
 
   /** `rest` is the shortest time between two drawings of new values, in milliseconds. */
   protected constructor(store: Store<State, Action>, private readonly rest: number) {
-    const headings = [element("td"), ...["least", "mean", "largest"].map((text) => element("th", { scope: "col" }, text))];
-    this.values = element("div", { class: "values" }, element("table", {}, element("thead", {}, element("tr", {}, ...headings)), this.rows));
+    this.values = element("div", { class: "values" }, this.table.element);
     this.body = element("div", { class: "dock-body" }, this.canvas, this.values);
     new ResizeObserver(() => { if (this.isShown && this.canvas.clientWidth > 0) this.plot?.setSize(this.size()); }).observe(this.canvas);
     store.watch((state) => [state.looks, state.chosenView], () => this.update(), (a, b) => a.every((value, i) => Object.is(value, b[i])));
@@ -37,6 +37,10 @@ export abstract class ValuePlot implements Tab {
   show(shown: boolean): void {
     this.isShown = shown;
     if (shown) this.draw();
+  }
+
+  recolour(): void {
+    this.plot?.redraw(false);
   }
 
   /** There are new values. */
@@ -52,17 +56,12 @@ export abstract class ValuePlot implements Tab {
 
   /** Fills the table; null where there is nothing of that moment. */
   protected fill(now: Spread | null, before: Spread | null, earlier: string): void {
-    const names = ["now", earlier];
-    this.rows.replaceChildren(...[now, before].flatMap((spread, i) => (spread ? [this.row(names[i]!, i, spread)] : [])));
+    const rows = [{ name: "now", spread: now }, { name: earlier, spread: before }].map(({ name, spread }, i) =>
+      (spread ? { name, colour: seriesStyle(i), cells: spread.map((value) => digits(value)) } : null));
+    this.table.show(rows.filter((row) => row !== null));
   }
 
   protected size(): { width: number; height: number } {
     return { width: Math.max(120, this.canvas.clientWidth), height: Math.max(80, this.canvas.clientHeight) };
-  }
-
-  private row(name: string, i: number, spread: Spread): HTMLElement {
-    const colour = element("span", { class: "colour", "aria-hidden": "true" });
-    colour.style.background = COLOURS[i] ?? "";
-    return element("tr", {}, element("th", { scope: "row" }, colour, name), ...spread.map((value) => element("td", {}, digits(value))));
   }
 }

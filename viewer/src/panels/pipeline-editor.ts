@@ -1,17 +1,20 @@
 /** The editor of one pipeline: its text with the checker's marks, what stands at the cursor, and what the run says to it. */
-import type { FieldInformation, Json } from "../connection/protocol";
+import type { Json } from "../connection/protocol";
 import { element, part, write } from "../dom";
 import type { Checker } from "../pipelines/checker";
 import type { PipelineEditor } from "../pipelines/editor";
 import { markOf, refusalMark } from "../pipelines/marks";
 import type { Mark } from "../pipelines/marks";
-import { placeAt } from "../pipelines/place";
+import { namesAt, namesOf, readsDescribed } from "../pipelines/names";
+import { placeAt, readSoFar } from "../pipelines/place";
+import type { Path } from "../pipelines/place";
 import { descriptionAt } from "../pipelines/suggestions";
 import type { KnownNames } from "../pipelines/suggestions";
+import { unknownNames } from "../pipelines/unknown-names";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { changeOf, isChanged, openDraft } from "../store/pipeline-drafts";
-import { QUALITY } from "../store/pipelines";
+import type { PipelineDraft } from "../store/pipeline-drafts";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
@@ -53,8 +56,10 @@ export class PipelineEditorPanel {
       event.stopPropagation();
       this.leave();
     });
-    const seen = (state: State): unknown[] => [state.pipelines.open, openDraft(state.pipelines), whyNotSteering(state), state.pipelines.asked];
+    const seen = (state: State): unknown[] =>
+      [state.pipelines.open, openDraft(state.pipelines), whyNotSteering(state), state.pipelines.asked, state.pipelines.known];
     store.watch(seen, () => this.show(), (a, b) => a.every((value, i) => Object.is(value, b[i])));
+    store.watch(({ hello }) => [hello?.channel, hello?.fields, hello?.features.map(({ name }) => name)], () => this.show(), sameJson);
     // What a pipeline must go with has changed.
     store.watch((state) => [state.pipelines.known, state.hello?.parameters.map(({ name }) => name)] as const, () => this.check(), sameJson);
   }
@@ -75,17 +80,19 @@ export class PipelineEditorPanel {
     write(part("pipeline-title"), draft.replaced ?? "New pipeline");
     const isWaiting = asked !== null && asked.key === open && (asked.state === "sent" || asked.state === "accepted");
     const errors = draft.checked?.errors ?? [];
-    const refusal = asked !== null && asked.key === open && asked.state === "refused" && asked.text === draft.text ? refusalMark(draft.text, asked.reason) : null;
-    this.marks = [...errors.map((error) => markOf(draft.text, error)), ...(refusal ? [refusal] : [])];
-    this.showErrors(errors.length, draft.checked?.more ?? 0);
+    const isRefused = asked !== null && asked.key === open && asked.state === "refused" && asked.text === draft.text;
+    const refusal = isRefused ? refusalMark(draft.text, asked.reason) : null;
+    const warnings = this.warnings(draft).filter(({ from, to }) => !refusal || to <= refusal.from || from >= refusal.to);
+    this.marks = [...errors.map((error) => markOf(draft.text, error)), ...(refusal ? [refusal] : []), ...warnings];
+    this.showMarks(refusal, draft.checked?.more ?? 0);
     const apply = part("pipeline-apply") as HTMLButtonElement;
     const isNew = draft.replaced === null;
     const whyNot = why !== "" ? why : errors.length > 0 ? "There are errors in it." : draft.checked === null ? "It is being checked." : isWaiting ? "The run has not answered yet." : !isNew && !isChanged(draft) ? "Nothing is changed." : "";
     apply.disabled = whyNot !== "";
     apply.title = whyNot || "Ctrl+Enter";
     (part("pipeline-revert") as HTMLButtonElement).disabled = !isChanged(draft);
-    write(part("pipeline-state"), this.stateText(draft.checked !== null, errors.length + (draft.checked?.more ?? 0), why));
-    part("pipeline-state").dataset.tone = errors.length > 0 ? "bad" : "good";
+    write(part("pipeline-state"), this.stateText(draft.checked !== null, errors.length + (draft.checked?.more ?? 0), warnings.length, why === "" && isRefused ? "Refused by the run." : why));
+    part("pipeline-state").dataset.tone = errors.length > 0 || isRefused ? "bad" : warnings.length > 0 ? "warning" : "good";
     if (this.editor) {
       this.editor.show(draft.text, why !== "");
       this.editor.mark(this.marks);
@@ -98,20 +105,29 @@ export class PipelineEditorPanel {
     void this.begin();
   }
 
-  private stateText(isChecked: boolean, errors: number, why: string): string {
+  /** Names that nobody seems to have. What the run has taken needs no warning, and where there are errors what is missing may be what could not be read. */
+  private warnings(draft: PipelineDraft): Mark[] {
+    const { state } = this.store;
+    const isNews = draft.replaced === null || isChanged(draft);
+    if (draft.checked?.errors.length !== 0 || this.unchecked !== "" || !isNews || !readsDescribed(state, readSoFar(draft.text))) return [];
+    return unknownNames(draft.text, namesOf(state));
+  }
+
+  private stateText(isChecked: boolean, errors: number, warnings: number, why: string): string {
     if (why !== "") return why;
     if (!isChecked) return "Checking…";
     if (this.unchecked !== "") return `Not checked here (${this.unchecked}): the run checks it.`;
-    return errors === 0 ? "No errors." : errors === 1 ? "1 error." : `${errors} errors.`;
+    const ofWarnings = warnings === 0 ? "" : warnings === 1 ? ", 1 warning" : `, ${warnings} warnings`;
+    return `${errors === 0 ? "No errors" : errors === 1 ? "1 error" : `${errors} errors`}${ofWarnings}.`;
   }
 
-  private showErrors(count: number, more: number): void {
+  /** Lists what is marked; `refusal` is what the run has said. */
+  private showMarks(refusal: Mark | null, more: number): void {
     const list = part("pipeline-errors");
     list.hidden = this.marks.length === 0;
-    const rows = this.marks.map((mark, index) => ({ mark, isOfRun: index >= count }));
-    list.replaceChildren(...rows.map(({ mark, isOfRun }) => element("li", {},
+    list.replaceChildren(...this.marks.map((mark) => element("li", mark.isWarning ? { class: "warning" } : {},
       element("button", { type: "button", class: "load", title: "Go there", onclick: () => this.editor?.goTo(mark.from, mark.to) },
-        element("span", { class: "detail" }, `line ${mark.line}${isOfRun ? " · the run" : ""}`), element("span", { class: "title" }, mark.text)),
+        element("span", { class: "detail" }, `line ${mark.line}${mark === refusal ? " · the run" : mark.isWarning ? " · warning" : ""}`), element("span", { class: "title" }, mark.text)),
       mark.fix ? element("button", { type: "button", class: "small", "data-act": "fix", onclick: () => this.editor?.replace(mark.from, mark.to, mark.fix!.insert) }, `Use ${mark.fix.name}`) : null)),
     ...(more > 0 ? [element("li", { class: "hint" }, `and ${more} more`)] : []));
   }
@@ -140,10 +156,17 @@ export class PipelineEditorPanel {
     const [{ PipelineEditor }, schema] = await Promise.all([this.parts.load(), this.parts.schema()]);
     this.schema = schema;
     this.editor = new PipelineEditor(part("pipeline-text"), "the pipeline as JSON", {
-      schema: () => this.schema, names: () => knownNames(this.store.state),
+      schema: () => this.schema, names: (path) => this.names(path),
       written: (text) => this.store.dispatch({ type: "pipeline written", text }),
       moved: (offset) => this.describe(offset), apply: () => this.apply(), leave: () => this.leave(),
     });
+  }
+
+  /** The names that may be written at a path of the text. */
+  private names(path: Path): KnownNames {
+    const { state } = this.store;
+    const draft = openDraft(state.pipelines);
+    return namesAt(namesOf(state), readSoFar(draft?.text ?? ""), draft?.replaced ?? null, path);
   }
 
   /** Says what stands at the cursor. */
@@ -197,17 +220,4 @@ export class PipelineEditorPanel {
     const row = [...part("pipelines").querySelectorAll<HTMLElement>("li")].find(({ dataset }) => dataset.pipeline === name);
     (row?.querySelector<HTMLElement>("button") ?? part("pipeline-add")).focus();
   }
-}
-
-/** The names that can be written into a pipeline of this run. */
-export function knownNames({ hello, pipelines }: State): KnownNames {
-  const described = ({ association, components, unit }: FieldInformation): string =>
-    `${components === 1 ? "A scalar" : components === 3 ? "A vector" : `${components} components`} at each ${association}${unit ? `, in ${unit}` : ""}.`;
-  const fields = (hello?.fields ?? []).map((field) => ({ name: field.name, description: described(field) }));
-  if (!fields.some(({ name }) => name === QUALITY)) fields.push({ name: QUALITY, description: "The quality of the cells: 1 is ideal, 0 is inverted." });
-  const channels = [hello?.channel, ...pipelines.known.map(({ channel }) => channel)].filter((name): name is string => typeof name === "string");
-  return {
-    fields, features: hello?.features.map(({ name }) => name) ?? [], monitors: [...new Set(hello?.monitors?.map(({ name }) => name))],
-    channels: [...new Set(channels)], parameters: hello?.parameters.map(({ name }) => name) ?? [],
-  };
 }

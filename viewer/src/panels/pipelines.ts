@@ -37,7 +37,7 @@ export class PipelinesPanel {
     const seen = (state: State): unknown[] =>
       [state.pipelines.known, state.pipelines.drafts, state.pipelines.open, whyNotSteering(state), state.hello === null, state.hello?.recording];
     store.watch(seen, () => this.show(), (a, b) => a.every((value, i) => Object.is(value, b[i])));
-    store.watch((state) => state.pipelines.asked, (asked) => this.tell(asked));
+    store.watch((state) => state.pipelines.asked, (asked) => this.showOutcome(asked));
     // Costs change with every run of a pipeline: once a second is often enough to read.
     setInterval(() => this.showCosts(), 1000);
   }
@@ -75,7 +75,7 @@ export class PipelinesPanel {
     return element("li", { "data-pipeline": name },
       element("button", { type: "button", class: "load", "data-act": "load", title: why === "" ? "Edit it" : "Read it", onclick: () => this.open(pipeline) },
         element("span", { class: "title" }, name, draft && isChanged(draft) ? element("span", { class: "chip" }, "draft") : null),
-        element("span", { class: "detail" }, purpose(pipeline)),
+        element("span", { class: "detail", title: purpose(pipeline) }, purpose(pipeline)),
         element("span", { class: "detail cost" }, cadence(pipeline))),
       act("duplicate", "", "Duplicate", () => this.duplicate(pipeline)),
       act("remove", "×", "Remove", () => this.ask(name)));
@@ -156,12 +156,12 @@ export class PipelinesPanel {
   }
 
   /** Says what became of the change that was asked for last. */
-  private tell(asked: AskedChange | null): void {
-    const told = part("pipeline-told");
-    told.hidden = asked === null;
-    if (!asked) return write(told, "");
-    told.dataset.tone = asked.state === "applied" ? "good" : asked.state === "refused" || asked.state === "lost" ? "bad" : "warning";
-    write(told, toldText(asked));
+  private showOutcome(asked: AskedChange | null): void {
+    const shown = part("pipeline-outcome");
+    shown.hidden = asked === null;
+    if (!asked) return write(shown, "");
+    shown.dataset.tone = asked.state === "applied" ? "good" : asked.state === "refused" || asked.state === "lost" ? "bad" : "warning";
+    write(shown, outcomeText(asked));
   }
 }
 
@@ -176,7 +176,7 @@ function copySign(): SVGElement {
 }
 
 /** What became of a change, in words. */
-export function toldText({ state, name, key, reason, cycle }: AskedChange): string {
+function outcomeText({ state, name, key, reason, cycle }: AskedChange): string {
   const what = key === null ? `${name} is ` : "";
   switch (state) {
     case "sent": return `${key === null ? `The removal of ${name}` : name} was sent to the run.`;

@@ -5,6 +5,7 @@ import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWind
 import { BonesPicture } from "./bones";
 import { makeCanvas } from "./canvas";
 import { ChosenFaces } from "./chosen-faces";
+import { EarlyFrames } from "./early-frames";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
 import { bounds } from "./picking";
@@ -51,6 +52,7 @@ export class Scene {
   readonly camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
   private readonly ranges = new Ranges();
   private readonly pending = new Map<string, DataFrame>();
+  private readonly early = new EarlyFrames();
   private readonly ghost: Ghost;
   private readonly bones: BonesPicture;
   private readonly chosen: ChosenFaces;
@@ -144,10 +146,15 @@ export class Scene {
     for (const { name, kind } of views) {
       const look = looks[name];
       if (!look) continue;
-      const layer = this.layers.get(name) ?? new Layer(name, kind, look, this.renderer);
+      const known = this.layers.get(name);
+      const layer = known ?? new Layer(name, kind, look, this.renderer);
       layer.look = look;
       layer.setTheme(THEMES[this.theme].edge);
       this.layers.set(name, layer);
+      for (const frame of known ? [] : this.early.take(name)) {
+        if (frame.kind === "topology") this.setTopology(frame);
+        else this.setData(frame);
+      }
     }
     this.held = held;
     this.recolour = true;
@@ -168,12 +175,15 @@ export class Scene {
 
   setTopology(frame: TopologyFrame): void {
     this.pending.delete(frame.view);
-    this.layers.get(frame.view)?.setTopology(frame);
+    const layer = this.layers.get(frame.view);
+    if (layer) layer.setTopology(frame);
+    else this.early.keep(frame);
   }
 
   /** Takes values to be drawn with the next picture; returns whether the view and its topology are known. */
   setData(frame: DataFrame): boolean {
     const layer = this.layers.get(frame.view);
+    if (!layer) this.early.keep(frame);
     if (!layer?.topology || layer.topology.topology !== frame.topology) return false;
     this.pending.set(frame.view, frame);
     this.requestGently();

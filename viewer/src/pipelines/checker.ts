@@ -13,27 +13,27 @@ export type CheckAnswer = PipelineErrors | { failure: string };
 export class Checker {
   private worker: CheckWorker | null = null;
   private underway: ((answer: CheckAnswer) => void) | null = null;
-  private waiting: { question: PipelineQuestion; told: (answer: CheckAnswer) => void } | null = null;
+  private waiting: { question: PipelineQuestion; answered: (answer: CheckAnswer) => void } | null = null;
 
   /** `start` makes the worker when it is first needed. */
   constructor(private readonly start: () => CheckWorker) {}
 
-  check(question: PipelineQuestion, told: (answer: CheckAnswer) => void): void {
-    this.waiting = { question, told };
+  check(question: PipelineQuestion, answered: (answer: CheckAnswer) => void): void {
+    this.waiting = { question, answered };
     if (!this.underway) this.next();
   }
 
   private next(): void {
     const { waiting } = this;
     this.waiting = null;
-    this.underway = waiting?.told ?? null;
+    this.underway = waiting?.answered ?? null;
     if (!waiting) return;
     if (!this.worker) {
       this.worker = this.start();
       this.worker.onmessage = ({ data }) => {
-        const told = this.underway;
+        const answered = this.underway;
         this.next();
-        told?.(data);
+        answered?.(data);
       };
     }
     this.worker.postMessage(waiting.question);

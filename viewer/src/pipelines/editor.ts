@@ -13,14 +13,17 @@ import { EditorView, drawSelection, highlightActiveLine, keymap, lineNumbers } f
 import { tags } from "@lezer/highlight";
 import type { Json } from "../connection/protocol";
 import type { Mark } from "./marks";
+import { isFormula, isMessage } from "./formula";
 import { placeAt } from "./place";
-import { formulaNames, isFormula, suggestionsAt } from "./suggestions";
+import type { Path } from "./place";
+import { formulaNames, suggestionsAt } from "./suggestions";
 import type { KnownNames, Suggestion } from "./suggestions";
 
 /** What the editor asks, and whom it tells. */
 export interface Surroundings {
   schema(): Json;
-  names(): KnownNames;
+  /** The names that may be written at a path. */
+  names(path: Path): KnownNames;
   written(text: string): void;
   /** The cursor is elsewhere. */
   moved(offset: number): void;
@@ -57,8 +60,12 @@ const THEME = EditorView.theme({
   ".cm-tooltip.cm-completionInfo": { padding: "6px 9px", maxWidth: "280px", lineHeight: "1.4" },
   ".cm-diagnostic": { padding: "5px 9px", maxWidth: "340px" },
   ".cm-diagnostic-error": { borderLeftColor: "var(--bad)" },
+  ".cm-lint-marker-error": { content: "normal", backgroundColor: "var(--bad)", borderRadius: "50%" },
+  ".cm-lint-marker-warning": { content: "normal", backgroundColor: "var(--low)", clipPath: "polygon(50% 0, 100% 100%, 0 100%)" },
+  ".cm-diagnostic-warning": { borderLeftColor: "var(--low)" },
   ".cm-diagnosticAction": { backgroundColor: "var(--raised)", color: "var(--text)", border: "1px solid var(--line)", minHeight: "24px" },
   ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy var(--bad) 1.5px", textUnderlineOffset: "3px" },
+  ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline wavy var(--low) 1.5px", textUnderlineOffset: "3px" },
 });
 
 /** Puts a suggestion in place of what was begun, and the cursor where one goes on. */
@@ -125,8 +132,8 @@ export class PipelineEditor {
 
   mark(marks: readonly Mark[]): void {
     const { state } = this.view;
-    this.view.dispatch(setDiagnostics(state, marks.filter(({ to }) => to <= state.doc.length).map(({ from, to, text, fix }) => ({
-      from, to, severity: "error" as const, message: text, actions: fix ? [{ name: `Use ${fix.name}`, apply: () => this.replace(from, to, fix.insert) }] : [],
+    this.view.dispatch(setDiagnostics(state, marks.filter(({ to }) => to <= state.doc.length).map(({ from, to, text, fix, isWarning }) => ({
+      from, to, severity: isWarning ? "warning" as const : "error" as const, message: text, actions: fix ? [{ name: `Use ${fix.name}`, apply: () => this.replace(from, to, fix.insert) }] : [],
     }))));
   }
 
@@ -152,18 +159,22 @@ export class PipelineEditor {
     if (!place || context.state.readOnly) return null;
     const token = text.slice(place.from, place.to);
     if (token === "" && !context.explicit) return null;
-    if (place.part === "value" && token.startsWith('"') && isFormula(place.path)) return this.inFormula(context, place.path);
-    const suggestions = suggestionsAt(this.surroundings.schema(), place, this.surroundings.names());
+    if (place.part === "value" && token.startsWith('"') && (isFormula(place.path) || isMessage(place.path))) return this.inFormula(context, place.path);
+    const suggestions = suggestionsAt(this.surroundings.schema(), place, this.surroundings.names(place.path));
     const from = place.from + (token.startsWith('"') ? 1 : 0);
     return { from, options: suggestions.map((suggestion, index) => option(suggestion, (view) => take(view, suggestion), index)), validFor: /^[^"]*$/ };
   }
 
-  /** The names that begin with the word before the cursor. */
-  private inFormula(context: CompletionContext, path: readonly (string | number)[]): CompletionResult | null {
-    const word = context.matchBefore(/\{?[A-Za-z_][\w./]*/);
-    if (!word && !context.explicit) return null;
-    const options = formulaNames(path, this.surroundings.names());
-    return { from: word?.from ?? context.pos, options: options.map((suggestion, index) => ({ ...option(suggestion, undefined, index), apply: suggestion.insert })) };
+  /** The names that begin with what stands before the cursor: a word, or in a line of the log and where one was opened a brace. */
+  private inFormula(context: CompletionContext, path: Path): CompletionResult | null {
+    const inBraces = context.matchBefore(/\{[^{}"]*/);
+    const word = inBraces ?? (isMessage(path) ? null : context.matchBefore(/[A-Za-z_][\w.]*/));
+    if (!word && (isMessage(path) || !context.explicit)) return null;
+    const isClosed = context.state.doc.sliceString(context.pos, context.pos + 1) === "}";
+    const options = formulaNames(path, this.surroundings.names(path)).map((suggestion, index) => ({
+      ...option(suggestion, undefined, index), apply: inBraces ? `${suggestion.label}${isClosed ? "" : "}"}` : suggestion.insert,
+    }));
+    return { from: inBraces ? inBraces.from + 1 : word?.from ?? context.pos, options };
   }
 }
 

@@ -1,7 +1,11 @@
-/** Where in a JSON text something stands, also in one that is being written and has no end yet. */
+/** Where in a JSON text something stands, and what it says; also in one that is being written and has no end yet. */
+import type { Json } from "../connection/protocol";
 
 /** The way from the outermost value: keys and indices. */
 export type Path = readonly (string | number)[];
+
+/** A part of a text, from its first character to the one behind its last. */
+export interface Range { from: number; to: number }
 
 export interface Place {
   /** The way to the value that is written here, or of a key to the object that it is in. */
@@ -70,13 +74,22 @@ function walk(text: string, seen: (token: Token, levels: readonly Level[]) => bo
 const pathOf = (levels: readonly Level[]): (string | number)[] =>
   levels.flatMap<string | number>(({ kind, key, index }) => (kind === "array" ? [index] : key === null ? [] : [key]));
 
+/** A token of text with both its quotes. */
+const CLOSED = /^"(?:[^"\\]|\\.)*"$/;
+
+/** Whether what is typed at an offset belongs to a token: behind its first character, and behind its last where no quote has closed it. */
+function isInside(text: string, { kind, from, to }: Token, offset: number): boolean {
+  if (kind === "sign" || offset <= from || offset > to) return false;
+  return offset < to || !CLOSED.test(text.slice(from, to));
+}
+
 /** What is written at an offset of a text; null where nothing can be, such as behind a value. */
 export function placeAt(text: string, offset: number): Place | null {
   let found: Omit<Place, "keys"> | null = null;
   let depth = 0;
   const others: string[] = [];
   let isOver = false;
-  const note = (levels: readonly Level[], from: number, to: number): void => {
+  const note = (levels: readonly Level[], { from, to }: Range): void => {
     isOver = true;
     const level = levels.at(-1);
     const hasColon = text[tokenAt(text, to)?.from ?? -1] === ":";
@@ -95,10 +108,12 @@ export function placeAt(text: string, offset: number): Place | null {
   // On from there the rest of the object is looked at, for its other keys.
   const levels = walk(text, (token, levels) => {
     if (!isOver) {
-      const isIn = token.kind !== "sign" && token.from < offset && (offset < token.to || (offset === token.to && (token.kind === "plain" || text[token.to - 1] !== '"' || token.to - token.from === 1)));
-      if (isIn) note(levels, token.from, token.to);
-      else if (token.from >= offset) note(levels, offset, offset);
-      if (!isOver || isIn || found === null) return isOver && found === null;
+      const isIn = isInside(text, token, offset);
+      if (!isIn && token.from < offset) return false;
+      note(levels, isIn ? token : { from: offset, to: offset });
+      if (found === null) return true;
+      // It is none of the other keys itself.
+      if (isIn) return false;
     }
     if (levels.length < depth) return true;
     const level = levels.at(-1);
@@ -107,12 +122,47 @@ export function placeAt(text: string, offset: number): Place | null {
     }
     return false;
   });
-  if (!isOver) note(levels, offset, offset);
+  if (!isOver) note(levels, { from: offset, to: offset });
   return found === null ? null : { ...(found as Omit<Place, "keys">), keys: [...new Set(others)] };
 }
 
+/** The value of a text as far as it is written: what has no value yet is left out. */
+export function readSoFar(text: string): Json {
+  let root: Json = null;
+  walk(text, (token, levels) => {
+    const level = levels.at(-1);
+    const value = valueBegunBy(text.slice(token.from, token.to));
+    if (value === undefined || (level && level.expects !== "value")) return false;
+    if (level) put(root, pathOf(levels), value);
+    else root = value;
+    return false;
+  });
+  return root;
+}
+
+/** The value that begins with a token; undefined for none. */
+function valueBegunBy(token: string): Json | undefined {
+  if (token === "{") return {};
+  if (token === "[") return [];
+  if (token.startsWith('"')) return content(token);
+  try {
+    return JSON.parse(token) as Json;
+  } catch {
+    return undefined;
+  }
+}
+
+/** Puts a value at a path of another; nowhere, where the way there is none. */
+function put(root: Json, path: Path, value: Json): void {
+  let at: Json | undefined = root;
+  for (const step of path.slice(0, -1)) at = typeof at === "object" && at !== null && Object.hasOwn(at, step) ? (at as { [key: string]: Json })[step] : undefined;
+  const last = path.at(-1);
+  if (typeof at !== "object" || at === null || last === undefined || Array.isArray(at) !== (typeof last === "number")) return;
+  Object.defineProperty(at, last, { value, writable: true, enumerable: true, configurable: true });
+}
+
 /** The token at a line and column, counted from 1 in characters as the checker does. Of an object or a list it is the bracket. */
-export function tokenRange(text: string, line: number, column: number): { from: number; to: number } {
+export function tokenRange(text: string, line: number, column: number): Range {
   let start = 0;
   for (let at = 1; at < line; at++) {
     const end = text.indexOf("\n", start);
@@ -128,7 +178,7 @@ export function tokenRange(text: string, line: number, column: number): { from: 
 }
 
 /** The token of the value, or else of the last key, that is found along a path; null where not even its beginning is there. */
-export function rangeOf(text: string, path: Path): { from: number; to: number } | null {
+export function rangeOf(text: string, path: Path): Range | null {
   let best: { from: number; to: number; depth: number } | null = null;
   walk(text, (token, levels) => {
     const level = levels.at(-1);
@@ -150,3 +200,7 @@ export function rangeOf(text: string, path: Path): { from: number; to: number } 
 export function readPath(text: string): (string | number)[] {
   return [...text.matchAll(/\[(\d+)\]|([^.[\]]+)/g)].map(([, index, key]) => (index === undefined ? key! : Number(index)));
 }
+
+/** A path as errors write it. */
+export const writePath = (path: Path): string =>
+  path.map((step, index) => (typeof step === "number" ? `[${step}]` : index === 0 ? step : `.${step}`)).join("");

@@ -1,5 +1,6 @@
 /** What may be written at a place of a pipeline: the keys and values of the schema, and names that the run knows. */
 import type { Json } from "../connection/protocol";
+import { written } from "./formula";
 import type { Path, Place } from "./place";
 
 export interface Suggestion {
@@ -12,7 +13,7 @@ export interface Suggestion {
   description: string;
 }
 
-/** The names that a run knows. */
+/** The names that may be written at a place. */
 export interface KnownNames {
   fields: readonly { name: string; description: string }[];
   features: readonly string[];
@@ -32,17 +33,11 @@ const NAMES: Readonly<Record<string, NameKind>> = {
   field: "field", fields: "field", vector: "field", velocity: "field", pressure: "field", viscosity: "field",
   features: "feature", fixed: "feature", free: "feature", sliding: "feature",
   formula: "field", components: "field",
-  of: "monitor", minus: "monitor", monitor: "monitor", monitors: "monitor", when: "monitor", condition: "monitor",
+  of: "monitor", minus: "monitor", monitor: "monitor", monitors: "monitor", when: "monitor", condition: "monitor", message: "monitor",
   channel: "channel",
 };
-/** Keys whose values are formulas, in which names stand beside others. */
-const FORMULAS: ReadonlySet<string> = new Set(["when", "condition", "formula", "components"]);
-
-/** Whether the value at a path is a formula. */
-export const isFormula = (path: Path): boolean => FORMULAS.has(String(path.findLast((step) => typeof step === "string") ?? ""));
-
 /** The kind of names that stands at a path; null for none. */
-function nameKind(path: Path): NameKind | null {
+export function nameKind(path: Path): NameKind | null {
   const keys = path.filter((step) => typeof step === "string");
   const [above, key] = [keys.at(-2), keys.at(-1)];
   if (key === "name" && above === "set") return "parameter";
@@ -173,10 +168,10 @@ function valuesAt(root: Schema, { path }: Place, names: KnownNames): Suggestion[
   return [...found.values()];
 }
 
-/** The names that a formula at a path may hold, as they are written there. */
+/** The names that a formula or a line of the log at a path may hold, as they are written there. */
 export function formulaNames(path: Path, names: KnownNames): Suggestion[] {
   const suggestion = (label: string, detail: NameKind, description = ""): Suggestion =>
-    ({ label, insert: /^[A-Za-z_][\w.]*$/.test(label) ? label : `{${label}}`, detail, description });
+    ({ label, insert: written(label), detail, description });
   if (nameKind(path) === "field") return names.fields.map(({ name, description }) => suggestion(name, "field", description));
   const given = [["cycle", "The number of the step."], ["time", "The simulated time."]].map(([name, text]) => suggestion(name!, "monitor", text));
   return [...names.monitors.map((name) => suggestion(name, "monitor")), ...names.parameters.map((name) => suggestion(`parameter.${name}`, "parameter")), ...given];

@@ -3,18 +3,10 @@ import type { Json, PipelineCost } from "../connection/protocol";
 import { digits, seconds, words } from "../number";
 import { lineOf, planeOf } from "../store/pipelines";
 import type { Pipeline } from "../store/pipelines";
+import { isBody, partsOf, text } from "./stages";
 
-type Body = { [key: string]: Json };
-const isBody = (value: unknown): value is Body => typeof value === "object" && value !== null && !Array.isArray(value);
 const AXES = ["x", "y", "z"];
 
-/** The name of a stage or an action and what stands under it. */
-function partsOf(stage: Json): [string, Body] {
-  const [name, body] = isBody(stage) ? Object.entries(stage)[0] ?? ["nothing", null] : [String(stage), null];
-  return [name, isBody(body) ? body : {}];
-}
-
-const text = (value: Json | undefined): string => (typeof value === "string" ? value : "");
 const names = (value: Json | undefined): string => (Array.isArray(value) ? value.filter((name) => typeof name === "string").join(", ") : "");
 const number = (value: Json | undefined): string => (typeof value === "number" ? digits(value, 4) : "");
 const behind = (before: string, value: string): string => (value === "" ? "" : `${before}${value}`);

@@ -27,7 +27,7 @@ export type Action =
   | { type: "note pinned"; note: PinnedNote }
   | { type: "note removed"; number: number }
   | { type: "pipelines known"; pipelines: readonly Pipeline[] }
-  | { type: "pipelines told"; change: PipelineChange }
+  | { type: "pipelines outcome"; change: PipelineChange }
   | { type: "pipelines refused"; id: string; text: string }
   | { type: "refused"; id: string | null; text: string }
   | { type: "unreadable"; text: string }

@@ -81,7 +81,7 @@ export function pipelinesAfter(state: PipelinesState, action: Action): Pipelines
       return { ...state, drafts, open: state.open === action.key ? null : state.open };
     }
     case "pipelines asked": return { ...state, asked: { ...action.asked, state: "sent", reason: "", cycle: null } };
-    case "pipelines told": return withTold(state, action.change);
+    case "pipelines outcome": return withOutcome(state, action.change);
     case "pipelines refused": return state.asked?.id === action.id ? { ...state, asked: { ...state.asked, state: "refused", reason: action.text } } : state;
     case "connection": {
       const isOpen = state.asked?.state === "sent" || state.asked?.state === "accepted";
@@ -91,7 +91,7 @@ export function pipelinesAfter(state: PipelinesState, action: Action): Pipelines
   }
 }
 
-/** A change that is over is not told of any more once something else is done. */
+/** The outcome of a change is shown until something else is done. */
 const settled = (asked: AskedChange | null): AskedChange | null => (asked?.state === "sent" || asked?.state === "accepted" ? asked : null);
 
 const withDraft = (state: PipelinesState, key: string, draft: PipelineDraft): PipelinesState => ({ ...state, drafts: { ...state.drafts, [key]: draft } });
@@ -115,7 +115,7 @@ function withKnown(state: PipelinesState, known: readonly Pipeline[]): Pipelines
   return { ...state, known, drafts };
 }
 
-function withTold(state: PipelinesState, { id, status, cycle }: PipelineChange): PipelinesState {
+function withOutcome(state: PipelinesState, { id, status, cycle }: PipelineChange): PipelinesState {
   const { asked } = state;
   if (asked?.id !== id) return state;
   const next = { ...state, asked: { ...asked, state: status, cycle: cycle ?? null } };

@@ -62,7 +62,7 @@ function after(state: State, action: Action): State {
     case "following": return { ...state, following: action.on };
     case "note pinned": return { ...state, notes: [...state.notes.filter(({ number }) => number !== action.note.number), action.note] };
     case "note removed": return { ...state, notes: state.notes.filter(({ number }) => number !== action.number) };
-    case "pipelines known": case "pipelines told": case "pipelines refused": case "pipelines asked":
+    case "pipelines known": case "pipelines outcome": case "pipelines refused": case "pipelines asked":
     case "pipeline opened": case "pipeline written": case "pipeline checked": case "pipeline left": case "pipeline discarded":
       return { ...state, pipelines: pipelinesAfter(state.pipelines, action) };
     case "wheel answered": return { ...state, askedBy: null };

@@ -1,9 +1,10 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it, vi } from "vitest";
-import { PipelineEditorPanel, knownNames } from "../../src/panels/pipeline-editor";
+import { PipelineEditorPanel } from "../../src/panels/pipeline-editor";
 import { PipelinesPanel } from "../../src/panels/pipelines";
 import { Checker } from "../../src/pipelines/checker";
 import type { CheckAnswer, CheckWorker } from "../../src/pipelines/checker";
+import { namesAt, namesOf } from "../../src/pipelines/names";
 import type { PipelineQuestion } from "../../src/kernel/language";
 import { keyOf, readDrafts } from "../../src/store/pipeline-drafts";
 import type { Pipeline } from "../../src/store/pipelines";
@@ -40,7 +41,7 @@ describe("the pipelines of a run", () => {
   const row = (name: string): HTMLElement => [...document.querySelectorAll<HTMLElement>("#pipelines li")].find(({ dataset }) => dataset.pipeline === name)!;
   const act = (name: string, kind: string): HTMLElement => row(name).querySelector<HTMLElement>(`[data-act="${kind}"]`)!;
   const last = (): { id: string; [key: string]: unknown } => made.sent.at(-1) as never;
-  const told = (status: "accepted" | "applied", id = last().id): void => made.store.dispatch({ type: "pipelines told", change: { id, status, cycle: 130 } });
+  const outcome = (status: "accepted" | "applied", id = last().id): void => made.store.dispatch({ type: "pipelines outcome", change: { id, status, cycle: 130 } });
   const known = (...pipelines: Pipeline[]): void => made.store.dispatch({ type: "pipelines known", pipelines });
   const settle = async (): Promise<void> => { await vi.advanceTimersByTimeAsync(200); };
   const draft = () => made.store.state.pipelines.drafts[made.store.state.pipelines.open ?? ""];
@@ -67,7 +68,7 @@ describe("the pipelines of a run", () => {
     made.store.dispatch({ type: "status", status: { ...STATUS, pipelines: [{ name: "cut", runs: 2, seconds: 0.004, bytes: 3000, memory: 0, every: 1 }] }, at: 0 });
     await vi.advanceTimersByTimeAsync(1000);
     expect([...row("cut").querySelectorAll(".title, .detail")].map(({ textContent }) => textContent)).toEqual(["cut", "slice across x at 1 → streamed", "every 5 steps · 2\u00a0ms, 1.5\u00a0kB a run"]);
-    expect(knownNames(made.store.state)).toMatchObject({ features: ["inlet", "outlet", "wall", "throat"], monitors: ["quality.min"] });
+    expect(namesAt(namesOf(made.store.state), {}, null, ["when"])).toMatchObject({ features: ["inlet", "outlet", "wall", "throat"], monitors: ["quality.min"] });
   });
 
   it("are read by one who watches, and changed by nobody else than the one who steers", async () => {
@@ -103,11 +104,51 @@ describe("the pipelines of a run", () => {
     await settle();
     FakeEditor.made.surroundings.apply();
     expect(last()).toMatchObject({ pipelines: { set: [{ name: "cut", stages: [] }] } });
-    told("accepted");
-    expect(at("pipeline-told").textContent).toMatch(/^The run has taken it/);
-    told("applied");
+    outcome("accepted");
+    expect(at("pipeline-outcome").textContent).toMatch(/^The run has taken it/);
+    outcome("applied");
     known({ name: "cut", stages: [] }, health);
-    expect([at("pipeline-told").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
+    expect([at("pipeline-outcome").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
+  });
+
+  it("are warned of where they name what nobody has, and can be applied all the same", async () => {
+    act("health", "load").click();
+    await settle();
+    const state = () => [at("pipeline-state").textContent, at("pipeline-state").dataset.tone, at("pipeline-apply").disabled, FakeEditor.made.marks.length];
+    const write = async (field: string, more = ""): Promise<void> => {
+      FakeEditor.made.surroundings.written(`{"name": "health", ${more}"stages": [{"statistics": {"field": "${field}"}}]}`);
+      await settle();
+    };
+    await write("presure");
+    expect(state()).toEqual(["No errors, 1 warning.", "warning", false, 1]);
+    expect(document.querySelector("#pipeline-errors li.warning .title")?.textContent).toBe("stages[0].statistics.field: neither the run nor a stage before has a field “presure”; did you mean pressure?");
+    document.querySelector<HTMLElement>('#pipeline-errors [data-act="fix"]')!.click();
+    expect(FakeEditor.made.replace).toHaveBeenCalledWith(55, 64, '"pressure"');
+    // What is told of the run later counts at once.
+    made.greet({ fields: [{ name: "presure", association: "vertex", components: 1 }] });
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    made.greet({ fields: [] });
+    await write("nothing");
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    made.greet({ channel: "fluid" });
+    await write("nothing", '"channel": "solid", ');
+    expect(state()).toEqual(["No errors.", "good", false, 0]);
+    await write("nothing", '"channel": "fluid", ');
+    expect(state()).toEqual(["No errors, 1 warning.", "warning", false, 1]);
+    // Where there are errors it may be they that are to blame; and without a checker nobody knows whether there are.
+    answer = { errors: [{ line: 1, column: 2, path: "name", message: "found nothing", suggestion: null }], more: 0 };
+    await write("nothing");
+    expect(state()).toEqual(["1 error.", "bad", true, 1]);
+    answer = { failure: "no module" };
+    await write("nothing ");
+    expect(state()).toEqual(["Not checked here (no module): the run checks it.", "good", false, 0]);
+  });
+
+  it("are not warned of as the run has them", async () => {
+    known({ name: "later", stages: [{ statistics: { field: "nothing" } }] });
+    act("later", "load").click();
+    await settle();
+    expect([at("pipeline-state").textContent, FakeEditor.made.marks]).toEqual(["No errors.", []]);
   });
 
   it("are refused in words, with a mark where that is", async () => {
@@ -117,8 +158,9 @@ describe("the pipelines of a run", () => {
     await settle();
     at("pipeline-apply").click();
     made.store.dispatch({ type: "pipelines refused", id: last().id, text: "pipeline `health`: there is no field 'presure'; did you mean 'pressure'?" });
-    expect(at("pipeline-told").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
+    expect(at("pipeline-outcome").textContent).toBe("The run refused it: pipeline health: there is no field 'presure'; did you mean 'pressure'?");
     expect(FakeEditor.made.marks).toMatchObject([{ fix: { name: "pressure", insert: '"pressure"' } }]);
+    expect([at("pipeline-state").textContent, at("pipeline-state").dataset.tone]).toEqual(["Refused by the run.", "bad"]);
   });
 
   it("take another name in one change, and are added under a free one", async () => {
@@ -128,7 +170,7 @@ describe("the pipelines of a run", () => {
     await settle();
     at("pipeline-apply").click();
     expect(last()).toMatchObject({ pipelines: { all: [{ name: "across", stages: [] }, health] } });
-    told("applied");
+    outcome("applied");
     known({ name: "across", stages: [] }, health);
     FakeEditor.made.surroundings.leave();
     act("health", "duplicate").click();
@@ -163,7 +205,7 @@ describe("the pipelines of a run", () => {
     act("cut", "remove").click();
     expect(last()).toMatchObject({ pipelines: { remove: ["cut"] } });
     made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
-    expect(at("pipeline-told").textContent).toMatch(/^The connection was lost/);
+    expect(at("pipeline-outcome").textContent).toMatch(/^The connection was lost/);
   });
 
   it("begin with a template, in a menu that the keyboard opens and closes", async () => {

@@ -1,11 +1,13 @@
 import { describe, expect, it } from "vitest";
-import { placeAt, rangeOf, readPath, tokenRange } from "../../src/pipelines/place";
+import { placeAt, rangeOf, readSoFar, readPath, tokenRange } from "../../src/pipelines/place";
 
 /** The place at the `|` of a text, which is not part of it. */
 const at = (marked: string) => {
   const offset = marked.indexOf("|");
   return placeAt(marked.replace("|", ""), offset);
 };
+
+const RUBBISH = ['}]}"', '{"a"::,,[}', '["\\', '{"a": "x\ny"}', ":::", '"', '{{{{[[[["', '{"a": [1] {"length": 5}}', '{"__proto__" {"polluted": 1}}', '{"constructor" {"polluted": 1}}'];
 
 describe("where something is written", () => {
   it("is found in a text that is whole", () => {
@@ -22,11 +24,14 @@ describe("where something is written", () => {
     expect(at('{"stages": [|]}')).toMatchObject({ path: ["stages", 0], part: "value", from: 12, to: 12 });
     expect(at('{"every": |}')).toMatchObject({ path: ["every"], part: "value" });
     expect(at("|")).toMatchObject({ path: [], part: "value" });
+    // A quote that is escaped closes nothing.
+    expect(at('{"name": "a\\"|')).toMatchObject({ path: ["name"], part: "value", from: 9, to: 13 });
   });
 
   it("is nowhere where nothing can be", () => {
     expect(at('{"a" |')).toBeNull();
     expect(at('{"a": 1 |}')).toBeNull();
+    expect(at('{"a": "b"|}')).toBeNull();
     expect(at("{} |")).not.toBeUndefined();
   });
 
@@ -45,6 +50,25 @@ describe("where something is written", () => {
   });
 
   it("is told of any rubbish without a failure", () => {
-    for (const text of ['}]}"', '{"a"::,,[}', '["\\', '{"a": "x\ny"}', ":::", '"', '{{{{[[[["']) for (let offset = 0; offset <= text.length; offset++) expect(() => placeAt(text, offset)).not.toThrow();
+    for (const text of RUBBISH) for (let offset = 0; offset <= text.length; offset++) expect(() => placeAt(text, offset)).not.toThrow();
+  });
+});
+
+describe("what is written so far", () => {
+  it("is all of a text that is whole", () => {
+    const whole = { name: "a\"b", stages: [{ slice: { origin: [0, -1.5e3, null], on: true } }, {}], when: "" };
+    expect(readSoFar(JSON.stringify(whole, null, 1))).toEqual(whole);
+    expect(readSoFar('{"__proto__": {"polluted": 1}}')).toEqual(JSON.parse('{"__proto__": {"polluted": 1}}'));
+  });
+
+  it("is what has a value of one that is being written", () => {
+    expect(readSoFar('{"name": "a", "stages": [{"gradient": {"field": "p"}}, {"select": {"fields": ["v')).toEqual({ name: "a", stages: [{ gradient: { field: "p" } }, { select: { fields: ["v"] } }] });
+    expect(readSoFar('{"stages": [{"gradient": {"field": "p",}}, {"contour": {"field": }}, {"stream": {}}], "wh')).toEqual({ stages: [{ gradient: { field: "p" } }, { contour: {} }, { stream: {} }] });
+    expect([readSoFar(""), readSoFar("nonsense")]).toEqual([null, null]);
+  });
+
+  it("is read from any rubbish without a failure", () => {
+    for (const text of RUBBISH) for (let end = 0; end <= text.length; end++) expect(() => readSoFar(text.slice(0, end))).not.toThrow();
+    expect("polluted" in {}).toBe(false);
   });
 });

@@ -1,7 +1,8 @@
 import { describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
 import { placeAt } from "../../src/pipelines/place";
-import { descriptionAt, formulaNames, isFormula, suggestionsAt } from "../../src/pipelines/suggestions";
+import { isFormula, isMessage, namesIn } from "../../src/pipelines/formula";
+import { descriptionAt, formulaNames, suggestionsAt } from "../../src/pipelines/suggestions";
 import type { KnownNames } from "../../src/pipelines/suggestions";
 // As the server sends it; the crate tombolo-pipelines makes it.
 import schema from "../pipeline-schema.json";
@@ -57,6 +58,13 @@ describe("what may be written", () => {
     expect(labels('{"name": "|"}')).toEqual([]);
     expect([isFormula(["when"]), isFormula(["again_after", "condition"]), isFormula(["stages", 0, "expression", "components", 1]), isFormula(["name"])]).toEqual([true, true, true, false]);
     expect(formulaNames(["when"], names).map(({ insert }) => insert)).toEqual(["inlet.mean", "{pressure drop}", "parameter.inflow", "cycle", "time"]);
+  });
+
+  it("are names in formulas and in lines of the log, by themselves or in braces", () => {
+    expect(namesIn("2e3 * pressure_1 + max(velocity.x, {pressure drop}) - .5 > pi").map(({ name }) => name)).toEqual(["pressure_1", "velocity.x", "pressure drop", "pi"]);
+    const [, braced] = namesIn("größe + {a b}");
+    expect(braced).toEqual({ name: "a b", from: 8, to: 13 });
+    expect([isMessage(["then", 0, "log", "message"]), isMessage(["stages", 0, "write", "message"])]).toEqual([true, false]);
   });
 
   it("is described where the cursor is", () => {
