@@ -113,6 +113,22 @@ def test_an_order_is_given_forecast_and_taken_back(solver, run):
     assert np.array_equal(solver.points, solver.reference)
 
 
+def test_an_order_takes_the_place_of_one_that_waits(run):
+    run.wait_for(lambda: run.features, 30)
+    # It moves the mesh from its first shape on, and then rests for long: the others wait behind it.
+    slow = run.order(SQUEEZE, schedule={"steps": 2, "every": {"steps": 1_000_000}}).wait(60, until="applying")
+    second = run.order(SQUEEZE).wait(60, until="accepted")
+    better = run.order(SQUEEZE, replaces=second)
+    with pytest.raises(tombolo.RejectedError, match=f"replaced by order {better.id}"):
+        second.wait(60)
+    assert better.status == "accepted"
+    for order, reason in ((slow, "moves the mesh already"), ("nobody", "there is no order 'nobody'")):
+        with pytest.raises(tombolo.RejectedError, match=reason):
+            run.order(SQUEEZE, replaces=order).wait(60)
+    better.cancel()
+    assert better.status == "rejected"
+
+
 def test_an_order_that_folds_the_mesh_is_rejected(run):
     run.wait_for(lambda: run.features, 30)
     fold = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -1.5]}}]

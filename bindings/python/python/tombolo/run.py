@@ -560,6 +560,7 @@ class Run:
         schedule: Optional[Mapping[str, Any]] = None,
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
+        replaces: Union[Order, str, None] = None,
     ) -> Order:
         """Give an order of a new shape; it is on its way when this returns, and `Order.wait` waits for it.
 
@@ -571,6 +572,8 @@ class Run:
         schedule, deform, guard : dict, optional
             In how many steps the shape is reached; how the volume follows; what the mesh must keep to. Left out: what
             the run's configuration says.
+        replaces : Order or str, optional
+            An order that has not begun to move the mesh, whose place this one takes; that one is rejected.
 
         Raises
         ------
@@ -587,7 +590,9 @@ class Run:
                               schedule={"steps": 10})
             order.wait()
         """
-        text, name = _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard})
+        other = replaces.id if isinstance(replaces, Order) else replaces
+        settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other}
+        text, name = _json.order(edits, settings)
         self.drive()
         return Order(self, in_thread(lambda: self._client.order(text, name)))
 
