@@ -1,6 +1,7 @@
 /**
  * Changes the pipelines of a running nozzle as an engineer would, in Debian's Chromium: adds a slice with completion, misspells a key,
- * puts it right by the mark, is refused by the run, removes it again; by keyboard, on three sizes of page; and as one who watches.
+ * puts it right by the mark, is warned of a field, is refused by the run, removes it again; by keyboard, on three sizes of page; and as
+ * one who watches.
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/pipelines.mjs
  *
