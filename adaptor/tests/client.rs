@@ -10,14 +10,14 @@ use std::{
     process::{Command, Output},
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
 };
 
 use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
-use serde_json::{Value, json};
+use serde_json::Value;
 use tombolo::{
     OrderStatus, Parameter, Report,
     client::{Client, ClientError, Event, Link, Options, Received},
@@ -33,6 +33,8 @@ struct Run {
     link: Link,
     address: SocketAddr,
     over: Arc<AtomicBool>,
+    /// Milliseconds from step to step.
+    rest: Arc<AtomicU64>,
     thread: Option<JoinHandle<Report>>,
 }
 
@@ -50,15 +52,17 @@ impl Run {
         let address = solver.adaptor.address().expect("a server");
         let over = Arc::new(AtomicBool::new(false));
         let is_over = Arc::clone(&over);
+        let rest = Arc::new(AtomicU64::new(2));
+        let resting = Arc::clone(&rest);
         solver.step();
         let run = move || {
             while !solver.stopped && !is_over.load(Ordering::Relaxed) {
                 solver.step();
-                std::thread::sleep(Duration::from_millis(2));
+                std::thread::sleep(Duration::from_millis(resting.load(Ordering::Relaxed)));
             }
             solver.finish()
         };
-        Self { link, address, over, thread: Some(std::thread::spawn(run)) }
+        Self { link, address, over, rest, thread: Some(std::thread::spawn(run)) }
     }
 
     fn end(mut self) -> Report {
@@ -386,14 +390,9 @@ fn the_program_reaches_a_run() {
 fn the_program_lists_what_waits_and_replaces_it() {
     let run = Run::new(LINK_TO_ALL);
     let directory = tempfile::tempdir().expect("a directory");
-    let write = |name: &str, order: &Value| {
-        std::fs::write(directory.path().join(name), order.to_string()).expect("written");
-    };
-    let mut slow = squeeze(0.1);
-    slow["schedule"] = json!({"steps": 2, "every": {"steps": 1_000_000}});
-    write("slow.json", &slow);
-    write("second.json", &squeeze(0.2));
-    write("better.json", &squeeze(0.05));
+    for (name, by) in [("second.json", 0.2), ("better.json", 0.05)] {
+        std::fs::write(directory.path().join(name), squeeze(by).to_string()).expect("written");
+    }
     let link = run.link.to_string();
     let call = |task: &str, arguments: &[&str]| {
         let (code, said, output) =
@@ -403,36 +402,35 @@ fn the_program_lists_what_waits_and_replaces_it() {
     let given = |task: &str, arguments: &[&str]| {
         let (code, said, told) = call(task, arguments);
         assert_eq!(code, 0, "{task} {arguments:?}: {said}");
-        told.last().expect("a line")["order"]["id"].as_str().expect("a name").to_owned()
+        told[0]["order"]["id"].as_str().expect("a name").to_owned()
     };
-    let waiting = || {
-        let (code, said, told) = call("queue", &[]);
-        assert_eq!(code, 0, "{said}");
-        told.into_iter().map(|line| line["order"].clone()).collect::<Vec<_>>()
-    };
-    // It moves the mesh from its first shape on, and then rests for long.
-    let first = given("order", &["slow.json"]);
-    let begun = Instant::now();
-    while !waiting().is_empty() {
-        assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");
-    }
+    let watches = Options { watches: true, ..Options::default() };
+    let watching = Client::connect(&run.link, &watches).expect("connected");
+    // All of it comes while the solver computes one step.
+    run.rest.store(4000, Ordering::Relaxed);
+    let cycle = watching.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
+    watching.wait_for_status(PATIENCE, |status| status.cycle > cycle + 1).expect("a step");
     let second = given("order", &["second.json"]);
     let (code, said, _) = tombolo(directory.path(), &["queue", link.as_str()]);
-    let expected = format!("order {second}: waits for order {first}");
+    let expected = format!("order {second}: waits for the solver's next call, since cycle");
     assert!(code == 0 && said.contains(&expected), "{said}");
-
     let better = given("replace", &[&second, "better.json"]);
-    let ids: Vec<_> = waiting().iter().map(|order| order["id"].clone()).collect();
-    assert_eq!(ids, [better.as_str()]);
+    run.rest.store(2, Ordering::Relaxed);
+    let begun = Instant::now();
+    while tombolo(directory.path(), &["queue", link.as_str()]).1 != "no order waits\n" {
+        assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");
+    }
     for (order, reason) in [
         (second.as_str(), "waits no more"),
-        (first.as_str(), "moves the mesh already"),
+        (better.as_str(), "waits no more"),
         ("nobody", "there is no order 'nobody'"),
     ] {
         let (code, said, _) = call("replace", &[order, "second.json"]);
         assert!(code == 1 && said.contains(reason), "{order}: {code}: {said}");
     }
-    let (code, said, _) = call("cancel", &[&better]);
-    assert_eq!((code, waiting().len()), (0, 0), "{said}");
-    run.end();
+    let orders = run.end().orders;
+    let of = |id: &str| orders.iter().find(|order| order.id == id).expect("it was taken");
+    let reason = of(&second).reason.as_deref().unwrap_or_default();
+    assert!(reason.contains(&format!("replaced by order {better}")), "{reason}");
+    assert_eq!(of(&better).status, OrderStatus::Applied);
 }

@@ -113,20 +113,21 @@ def test_an_order_is_given_forecast_and_taken_back(solver, run):
     assert np.array_equal(solver.points, solver.reference)
 
 
-def test_an_order_takes_the_place_of_one_that_waits(run):
+def test_an_order_takes_the_place_of_one_that_waits(solver, run):
     run.wait_for(lambda: run.features, 30)
-    # It moves the mesh from its first shape on, and then rests for long: the others wait behind it.
-    slow = run.order(SQUEEZE, schedule={"steps": 2, "every": {"steps": 1_000_000}}).wait(60, until="applying")
-    second = run.order(SQUEEZE).wait(60, until="accepted")
-    better = run.order(SQUEEZE, replaces=second)
+    # Both come while the solver computes one step.
+    solver.step = 3.0
+    run.wait_for_cycle(run.status.cycle + 2, 30)
+    second = run.order([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.4]}}])
+    better = run.order(SQUEEZE, replaces=second).wait(60, until="accepted")
+    solver.step = 0.002
     with pytest.raises(tombolo.RejectedError, match=f"replaced by order {better.id}"):
         second.wait(60)
-    assert better.status == "accepted"
-    for order, reason in ((slow, "moves the mesh already"), ("nobody", "there is no order 'nobody'")):
+    better.wait(60)
+    assert [edit["translate"]["by"] for edit in run.stack] == [[0, 0, -0.2]]
+    for order, reason in ((second, "waits no more"), ("nobody", "there is no order 'nobody'")):
         with pytest.raises(tombolo.RejectedError, match=reason):
             run.order(SQUEEZE, replaces=order).wait(60)
-    better.cancel()
-    assert better.status == "rejected"
 
 
 def test_an_order_that_folds_the_mesh_is_rejected(run):
