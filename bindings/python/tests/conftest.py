@@ -60,26 +60,36 @@ def ends(points, tets):
 
 SQUEEZE = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}]
 
-CONFIGURATION = {
-    "version": 1,
-    "stream": {"listen": "127.0.0.1:0"},
-    "pipelines": [
-        {
-            "name": "midplane",
-            "every": {"steps": 1},
-            "stages": [
-                {"slice": {"origin": [0.5, 0.45, 0.5], "normal": [0, 1, 0]}},
-                {"select": {"fields": ["temperature", "material"]}},
-                {"stream": {"error": {"relative": 1e-6}}},
-            ],
-        },
-        {
-            "name": "health",
-            "every": {"steps": 1},
-            "stages": [{"quality": {}}, {"statistics": {"field": "temperature"}}],
-        },
-    ],
-}
+
+def load(file):
+    """An example as a module, which finds those beside it."""
+    file = EXAMPLES / file
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    specification = importlib.util.spec_from_file_location(file.stem, file)
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[specification.name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+study = load("study/study.py")
+CONFIGURATION = study.configuration(
+    {
+        "name": "midplane",
+        "every": {"steps": 1},
+        "stages": [
+            {"slice": {"origin": [0.5, 0.45, 0.5], "normal": [0, 1, 0]}},
+            {"select": {"fields": ["temperature", "material"]}},
+            {"stream": {"error": {"relative": 1e-6}}},
+        ],
+    },
+    {
+        "name": "health",
+        "every": {"steps": 1},
+        "stages": [{"quality": {}}, {"statistics": {"field": "temperature"}}],
+    },
+)
 
 
 class Solver:
@@ -145,25 +155,41 @@ def run(solver):
         yield connected
 
 
-def load(file):
-    """An example as a module."""
-    specification = importlib.util.spec_from_file_location(Path(file).stem, EXAMPLES / file)
-    module = importlib.util.module_from_spec(specification)
-    sys.modules[specification.name] = module
-    specification.loader.exec_module(module)
-    return module
+# Meshes coarser than those that scripts/meshes has by name.
+COARSE = """
+import runpy, sys
+import gmsh
+meshes = runpy.run_path(sys.argv[1])
+geometry, size, folder = sys.argv[2:]
+gmsh.initialize(interruptible=False)
+meshes["generate"](meshes[geometry], float(size))
+gmsh.model.mesh.optimize("Netgen")
+meshes["write"](geometry, folder, "4.1")
+gmsh.finalize()
+"""
 
 
 @pytest.fixture
-def small_nozzle(tmp_path):
+def small_case(tmp_path):
+    """Makes a case of the flow on a coarse mesh."""
+
+    def make(name, geometry, size, **changes):
+        if not FLOW.exists():
+            pytest.skip("the program flow is not built: cargo build -p tombolo-flow")
+        pytest.importorskip("gmsh")
+        command = [sys.executable, "-c", COARSE, PROJECT / "scripts/meshes", geometry, str(size), tmp_path]
+        subprocess.run(command, check=True)
+        cases = EXAMPLES / "flow/cases"
+        case = json.loads((cases / f"{name}.json").read_text())
+        case |= {"mesh": f"{geometry}.msh", "pipelines": str(cases / case["pipelines"]), **changes}
+        file = tmp_path / f"{name}.json"
+        file.write_text(json.dumps(case))
+        return file
+
+    return make
+
+
+@pytest.fixture
+def small_nozzle(small_case):
     """The case of the nozzle on a coarse mesh."""
-    if not FLOW.exists():
-        pytest.skip("the program flow is not built: cargo build -p tombolo-flow")
-    pytest.importorskip("gmsh")
-    meshes = [sys.executable, PROJECT / "scripts/meshes", "channel-5k", "--out", tmp_path]
-    subprocess.run(meshes, check=True, stdout=subprocess.DEVNULL)
-    case = json.loads((EXAMPLES / "flow/cases/nozzle.json").read_text())
-    case |= {"mesh": "channel-5k.msh", "pipelines": str(EXAMPLES / "flow/pipelines/nozzle.json")}
-    file = tmp_path / "nozzle.json"
-    file.write_text(json.dumps(case))
-    return file
+    return small_case("nozzle", "channel", 0.0198)

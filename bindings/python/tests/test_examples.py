@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tombolo
-from conftest import EXAMPLES, FLOW, load
+from conftest import EXAMPLES, FLOW, load, study
 from tombolo import _native
 
 
@@ -101,22 +101,19 @@ def test_a_loaded_bar_with_ngsolve(tmp_path):
     assert np.array_equal(points[0], points[199])
 
 
-def test_a_study_on_a_running_flow_finds_what_one_with_restarts_finds(small_nozzle):
+def test_a_throat_is_found_on_a_running_flow_and_with_restarts(small_nozzle):
     pytest.importorskip("scipy")
     throat = load("study/throat.py")
+    flows = study.Flows(FLOW, small_nozzle, {}, throat.SCHEDULE, throat.CRITERION, timeout=60)
+    found = study.compare(flows, throat.throat, throat.search(times=1.5, tolerance=5e-3))
 
-    def begin(orders=()):
-        return throat.flow(FLOW, small_nozzle, 1, orders)
-
-    wanted, studies, heights = throat.compare(begin, times=1.5, tolerance=5e-3, timeout=60)
-    assert heights[0] == pytest.approx(heights[1], abs=5e-3)
-    for study in studies:
-        assert study.answers[-1][1] == pytest.approx(wanted, rel=0.02)
+    assert found.values[0] == pytest.approx(found.values[1], abs=5e-3)
+    for way in found.studies:
+        assert way.answers[-1].drop == pytest.approx(1.5 * found.running.reference, rel=0.02)
     # From a shape nearby the flow settles sooner than from rest.
-    (before, _, _), (height, _, running) = studies[0].answers[-2:]
-    _, _, anew = studies[1].answers[-1]
-    assert abs(height - before) < 0.05
-    assert running < anew
+    before, after = found.running.answers[-2:]
+    assert abs(after.value - before.value) < 0.05
+    assert after.steps < found.restarted.answers[-1].steps
 
 
 def test_heat_in_numpy_alone(tmp_path):

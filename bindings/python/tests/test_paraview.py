@@ -8,24 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tombolo
-from conftest import FLOW, ends, load
+from conftest import FLOW, ends, study
 
 CLIENT = Path(__file__).parents[3] / "clients/paraview"
-PIPELINES = {
-    "version": 1,
-    "stream": {"listen": "127.0.0.1:0"},
-    "pipelines": [
-        {
-            "name": "surface",
-            "every": {"steps": 10},
-            "stages": [
-                {"surface": {}},
-                {"select": {"fields": ["velocity", "pressure"]}},
-                {"write": {"file": "surface-{cycle}.vtp"}},
-                {"stream": {"error": {"relative": 1e-3}}},
-            ],
-        },
-        {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"guard": {"min_scaled_jacobian": 0.02}}]},
+SURFACE = {
+    "name": "surface",
+    "every": {"steps": 10},
+    "stages": [
+        {"surface": {}},
+        {"select": {"fields": ["velocity", "pressure"]}},
+        {"write": {"file": "surface-{cycle}.vtp"}},
+        {"stream": {"error": {"relative": 1e-3}}},
     ],
 }
 
@@ -110,8 +103,8 @@ def triangles(rows):
 
 def test_a_running_nozzle_is_followed_and_steered_by_the_plug_in(small_nozzle, tmp_path):
     pyvista, spatial = pytest.importorskip("pyvista"), pytest.importorskip("scipy.spatial")
-    throat = load("study/throat.py")
-    with throat.begun(FLOW, small_nozzle, PIPELINES, [], tmp_path) as link:
+    pipelines = study.configuration(SURFACE, study.SHAPE)
+    with study.begun(FLOW, small_nozzle, pipelines, [], tmp_path) as link:
         said = pvpython(CLIENT / "nozzle.py", link, "--out", tmp_path)
     assert said.count("forecast: applied") == 3, said
     assert said.count("order: applied") == 3, said

@@ -1,0 +1,361 @@
+"""What the studies of this folder share: a flow that runs, answers that have settled, and two ways to ask for them.
+
+A study asks for the pressure drop at one shape after another. `Running` asks one flow that goes on, and changes its
+shape by an order. `Restarted` asks a flow that begins anew in each shape. Both wait by the same `Criterion`. For a
+study of your own copy this file and one that uses it: that one says what the shapes are, and how they are searched.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+import tombolo
+from numpy.typing import NDArray
+
+DROP = {
+    "name": "study",
+    "every": {"steps": 1},
+    "stages": [
+        {"surface": {}},
+        {"integrate": {"name": "inlet", "features": ["inlet"], "field": "pressure", "unit": "Pa"}},
+        {"integrate": {"name": "outlet", "features": ["outlet"], "field": "pressure", "unit": "Pa"}},
+        {"difference": {"name": "drop", "of": "inlet.mean", "minus": "outlet.mean", "unit": "Pa"}},
+    ],
+}
+SHAPE = {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"guard": {"min_scaled_jacobian": 0.02}}]}
+
+Edits = Callable[[float], list[dict[str, Any]]]
+Ask = Callable[[float], float]
+Search = Callable[[Ask, float], float]
+
+
+def configuration(*pipelines: Mapping[str, Any]) -> dict[str, Any]:
+    """Pipelines with a server on any free port."""
+    return {"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": list(pipelines)}
+
+
+@contextlib.contextmanager
+def begun(
+    program: Path, case: Path, pipelines: Mapping[str, Any], orders: Sequence[Mapping[str, Any]], folder: Path
+) -> Iterator[Path]:
+    """The link of a flow that runs; it is ended behind the block."""
+    (folder / "pipelines.json").write_text(json.dumps(pipelines))
+    (folder / "orders.json").write_text(json.dumps(orders))
+    files = ["--pipelines", folder / "pipelines.json", "--orders", folder / "orders.json", "--out", folder]
+    command = [str(part) for part in (program, "--case", case, *files)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout is not None
+    try:
+        line = "it said nothing"
+        # The file with the link is there before the run says so.
+        while not (links := sorted(folder.glob("tombolo-*.link"))):
+            said = process.stdout.readline()
+            if not said:
+                raise RuntimeError(f"the flow ended before it opened its server: {line}")
+            line = said
+        yield links[0]
+    finally:
+        process.terminate()
+        process.stdout.read()
+        process.wait(timeout=60)
+        process.stdout.close()
+
+
+class Criterion(NamedTuple):
+    """When a flow has settled: over `window` steps its drop has changed by less than `change` of the reference's."""
+
+    window: int
+    change: float
+
+
+class Flows(NamedTuple):
+    """How the flows of a study begin, change their shape and settle.
+
+    Attributes
+    ----------
+    program, case : path
+        The program `flow`, and its case.
+    parameters : dict
+        Parameters of the case that are not as it says.
+    schedule : int
+        Steps that the mesh takes from one shape to the next.
+    criterion : Criterion
+        When a flow has settled.
+    timeout : float
+        Seconds for one answer, at most.
+    """
+
+    program: Path
+    case: Path
+    parameters: Mapping[str, float]
+    schedule: int
+    criterion: Criterion
+    timeout: float = 600.0
+
+    @contextlib.contextmanager
+    def begun(self, edits: Sequence[Mapping[str, Any]] = ()) -> Iterator[tombolo.Run]:
+        """A client of a flow that begins in the shape of these edits; both are ended behind the block."""
+        orders = [
+            {"at": {"cycle": 0}, "parameter": {"name": name, "value": value}} for name, value in self.parameters.items()
+        ]
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            begun(
+                self.program, self.shaped(edits, Path(folder)), configuration(DROP, SHAPE), orders, Path(folder)
+            ) as link,
+            tombolo.connect(link) as run,
+        ):
+            yield run
+
+    def shaped(self, edits: Sequence[Mapping[str, Any]], folder: Path) -> Path:
+        """The case on a mesh that edits have shaped; the case as it is without any."""
+        if not edits:
+            return self.case
+        case = json.loads(self.case.read_text())
+        mesh, shape, file = folder / "shaped.vtu", folder / "edits.json", folder / "case.json"
+        shape.write_text(json.dumps(edits))
+        files = ["--mesh", self.case.parent / case["mesh"], "--edits", shape, "--out", mesh]
+        subprocess.run([sys.executable, "-m", "tombolo", "edit", *files], check=True, stdout=subprocess.DEVNULL)
+        # The case's own pipelines lie beside the case.
+        del case["pipelines"]
+        file.write_text(json.dumps(case | {"mesh": str(mesh)}))
+        return file
+
+    def settled(self, run: tombolo.Run, since: int, scale: Optional[float]) -> tuple[float, int]:
+        """The pressure drop, once it has settled behind the cycle `since`; and the cycle at which it had.
+
+        `scale` is the drop of the reference, None where it is that which is asked for.
+        """
+        window, change = self.criterion
+
+        def found() -> Optional[tuple[float, int]]:
+            cycles, drops = history(run)
+            cycles, drops = cycles[cycles > since], drops[cycles > since]
+            if len(drops) < window:
+                return None
+            windows = np.lib.stride_tricks.sliding_window_view(drops, window)
+            allowed = change * np.abs(windows.mean(axis=1) if scale is None else scale)
+            steady = np.flatnonzero(np.ptp(windows, axis=1) <= allowed)
+            if not len(steady):
+                return None
+            end = steady[0] + window - 1
+            return float(drops[end]), int(cycles[end])
+
+        answer = run.wait_for(found, self.timeout)
+        assert answer is not None
+        return answer
+
+
+def history(run: tombolo.Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The cycles so far, and the pressure drop at each."""
+    table = run.monitors.get("study")
+    if table is None:
+        return np.empty(0), np.empty(0)
+    drops = table["drop"]
+    return table["cycle"][: len(drops)], drops
+
+
+class Answer(NamedTuple):
+    """The pressure drop at a value of what is varied, and the steps that it took to settle."""
+
+    value: float
+    drop: float
+    steps: int
+
+
+class Study:
+    """Answers to a question, and what they cost.
+
+    Attributes
+    ----------
+    name : str
+        The way it asks.
+    reference : float
+        The drop of the shape that the case begins with: what "settled" is measured by.
+    answers : list of Answer
+        What it was told, in order.
+    histories : list
+        Of each flow the cycles and the drops.
+    spent : int
+        The steps of all flows.
+    """
+
+    name: str
+    reference: float
+
+    def __init__(self, flows: Flows, edits: Edits) -> None:
+        self.flows, self.edits = flows, edits
+        self.answers: list[Answer] = []
+        self.histories: list[tuple[NDArray[np.float64], NDArray[np.float64]]] = []
+        self.spent = 0
+
+    @property
+    def mean(self) -> float:
+        """The steps that an answer took, in the mean."""
+        return float(np.mean([answer.steps for answer in self.answers]))
+
+
+class Running(Study):
+    """Answers from one flow that goes on.
+
+    The steps of an answer count from the first motion of the mesh. `spent` counts all: those too before the first
+    order, `start`, and those that the flow takes while an order is on its way.
+    """
+
+    name = "one running flow"
+
+    def __init__(self, run: tombolo.Run, flows: Flows, edits: Edits) -> None:
+        super().__init__(flows, edits)
+        self.run = run
+        self.reference, self.start = flows.settled(run, 0, None)
+        self.spent, self.histories = self.start, [history(run)]
+
+    def drop(self, value: float) -> float:
+        """Ask for the drop at a value."""
+        # A whole stack replaces the orders before it: shapes do not add up.
+        schedule = {"steps": self.flows.schedule, "ease": "smooth"}
+        order = {"stack": self.edits(value), "schedule": schedule}
+        applied = self.run.order(order).wait(self.flows.timeout).cycle_applied
+        assert applied is not None
+        drop, cycle = self.flows.settled(self.run, applied + self.flows.schedule, self.reference)
+        self.answers.append(Answer(value, drop, cycle - applied))
+        self.spent, self.histories = cycle, [history(self.run)]
+        return drop
+
+
+class Restarted(Study):
+    """Answers from a flow that begins anew in each shape."""
+
+    name = "a flow for each shape"
+
+    def __init__(self, flows: Flows, edits: Edits, reference: float) -> None:
+        super().__init__(flows, edits)
+        self.reference = reference
+
+    def drop(self, value: float) -> float:
+        """Ask for the drop at a value."""
+        with self.flows.begun(self.edits(value)) as run:
+            drop, cycle = self.flows.settled(run, 0, self.reference)
+            cycles, drops = history(run)
+        self.answers.append(Answer(value, drop, cycle))
+        self.histories.append((cycles[cycles <= cycle], drops[cycles <= cycle]))
+        self.spent += cycle
+        return drop
+
+
+class Comparison(NamedTuple):
+    """A study that was made in both ways, and the values that they have found."""
+
+    running: Running
+    restarted: Restarted
+    values: tuple[float, float]
+
+    @property
+    def studies(self) -> tuple[Study, Study]:
+        """Both ways."""
+        return self.running, self.restarted
+
+
+def compare(flows: Flows, edits: Edits, search: Search) -> Comparison:
+    """Makes a study in both ways.
+
+    Parameters
+    ----------
+    flows : Flows
+        How flows begin and settle.
+    edits : callable
+        The edits that make the shape of a value, measured from the reference.
+    search : callable
+        Finds a value, by a function that gives the drop at a value, and the drop of the reference.
+    """
+    with flows.begun() as run:
+        running = Running(run, flows, edits)
+        first = search(running.drop, running.reference)
+    restarted = Restarted(flows, edits, running.reference)
+    return Comparison(running, restarted, (first, search(restarted.drop, running.reference)))
+
+
+def least(drop: Ask, bounds: tuple[float, float], tolerance: float) -> float:
+    """The value of the least drop between two bounds, by Brent's method without derivatives."""
+    from scipy.optimize import minimize_scalar
+
+    return float(minimize_scalar(drop, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
+
+
+def arguments(
+    description: str, case: str, tolerance: float, schedule: int, criterion: Criterion
+) -> argparse.ArgumentParser:
+    """What each study can be told on the command line; these are its defaults."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--flow", type=Path, required=True, help="the program flow")
+    parser.add_argument("--case", type=Path, default=Path(case))
+    parser.add_argument(
+        "--set", nargs=2, action="append", default=[], metavar=("NAME", "VALUE"), help="a parameter of the case"
+    )
+    parser.add_argument("--tolerance", type=float, default=tolerance, help="of what is searched for")
+    parser.add_argument("--schedule", type=int, default=schedule, help="steps from one shape to the next")
+    parser.add_argument("--window", type=int, default=criterion.window, help="steps that settled drops are steady for")
+    parser.add_argument(
+        "--change", type=float, default=criterion.change, help="by which they may change, in parts of the reference's"
+    )
+    parser.add_argument("--timeout", type=float, default=600, help="seconds for one answer at most")
+    parser.add_argument("--plot", type=Path, help="a picture of the drop over the steps, by matplotlib")
+    return parser
+
+
+def flows(given: argparse.Namespace) -> Flows:
+    """The flows that the command line asks for."""
+    parameters = {name: float(value) for name, value in given.set}
+    criterion = Criterion(given.window, given.change)
+    return Flows(given.flow, given.case, parameters, given.schedule, criterion, given.timeout)
+
+
+def tell(comparison: Comparison, name: str) -> None:
+    """Prints what came out; `name` is what was varied."""
+    running, restarted, values = comparison
+    print(f"drop of the reference {running.reference:.3f} Pa after {running.start} steps")
+    for way, value in zip(comparison.studies, values):
+        print(f"{way.name}: {name} {value:.4f} after {len(way.answers)} answers and {way.spent} steps")
+        for answer in way.answers:
+            print(f"  {name} {answer.value:.4f}: {answer.drop:.3f} Pa, settled after {answer.steps} steps")
+    print(f"steps, running / anew: {running.spent / restarted.spent:.2f} in all", end=", ")
+    print(f"{running.mean / restarted.mean:.2f} for an answer, in the mean")
+
+
+def plot(comparison: Comparison, name: str, file: Path, wanted: Optional[float] = None) -> None:
+    """Draws the drop over the steps that were spent, and over what was varied."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (time, shape) = pyplot.subplots(
+        1, 2, figsize=(10, 3.5), width_ratios=(2, 1), sharey=True, layout="constrained"
+    )
+    for way, color, marker in zip(comparison.studies, ("tab:blue", "tab:orange"), "ox"):
+        spent = 0
+        for cycles, pressures in way.histories:
+            time.plot(spent + cycles, pressures, color=color, linewidth=1)
+            spent += int(cycles[-1])
+        values, drops, _ = zip(*way.answers)
+        shape.plot(values, drops, marker, color=color, markerfacecolor="none", label=way.name)
+    answers = [answer.drop for way in comparison.studies for answer in way.answers] + [comparison.running.reference]
+    room = 0.3 * np.ptp(answers)
+    time.set(xlabel="solver steps spent", ylabel="pressure drop [Pa]", xlim=(0, None))
+    # The peaks while a mesh moves would leave no room for the rest.
+    time.set(ylim=(min(answers) - room, max(answers) + room))
+    shape.set(xlabel=name)
+    if wanted is not None:
+        for axes in (time, shape):
+            axes.axhline(wanted, color="gray", linestyle="dotted")
+    shape.legend()
+    figure.savefig(file, dpi=110)
