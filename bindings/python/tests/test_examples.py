@@ -116,6 +116,29 @@ def test_a_throat_is_found_on_a_running_flow_and_with_restarts(small_nozzle):
     assert after.steps < found.restarted.answers[-1].steps
 
 
+def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
+    pytest.importorskip("scipy")
+    widening = load("study/widening.py")
+    # At half the density the stream keeps to the wall between these areas: the widest regains most.
+    density, speed, lower, upper = 500, 0.15625, 1.2, 2.0
+    case = small_case("pipe", "pipe", 0.011, density=density, time_step=0.02)
+    flows = study.Flows(FLOW, case, {}, 5, widening.CRITERION, timeout=60)
+    found = study.compare(flows, widening.widening, widening.search(lower, upper, tolerance=0.1))
+
+    assert found.values[0] == pytest.approx(found.values[1], abs=0.01)
+    assert upper - 0.1 < found.values[0] < upper
+    for way in found.studies:
+        answers = sorted(way.answers)
+        drops = [answer.drop for answer in answers]
+        assert drops == sorted(drops, reverse=True)
+        # Some of the pressure comes back, and no more than without friction: twice that of a flat profile.
+        for area, drop, _ in answers:
+            assert -density * speed**2 * (1 - 1 / area**2) < drop < found.running.reference
+    for running, restarted in zip(found.running.answers, found.restarted.answers):
+        assert running.drop == pytest.approx(restarted.drop, abs=5e-3 * found.running.reference)
+    assert found.running.answers[-1].steps < found.restarted.answers[-1].steps
+
+
 def test_heat_in_numpy_alone(tmp_path):
     heat = load("heat/python/heat_numpy.py")
     fluxes, points = {}, {}
