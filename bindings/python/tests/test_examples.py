@@ -139,6 +139,23 @@ def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
     assert found.running.answers[-1].steps < found.restarted.answers[-1].steps
 
 
+def test_an_angle_is_found_on_a_running_flow_and_with_restarts(small_case):
+    pytest.importorskip("scipy")
+    angle = load("study/angle.py")
+    case = small_case("bypass", "bypass", 0.0024)
+    flows = study.Flows(FLOW, case, angle.VISCOSITY, angle.SCHEDULE, angle.CRITERION, timeout=60)
+    found = study.compare(flows, angle.bend, angle.search(-10, 10, tolerance=2))
+
+    assert found.values[0] == pytest.approx(found.values[1], abs=3)
+    for way, value in zip(found.studies, found.values):
+        # The least drop lies between the bounds: it is more on both sides.
+        least = min(answer.drop for answer in way.answers)
+        assert -5 < value < 5
+        far = [answer for answer in way.answers if abs(answer.value - value) > 4]
+        assert far and all(answer.drop > least * 1.0005 for answer in far)
+    assert found.running.mean < 0.9 * found.restarted.mean
+
+
 def test_heat_in_numpy_alone(tmp_path):
     heat = load("heat/python/heat_numpy.py")
     fluxes, points = {}, {}
