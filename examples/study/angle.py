@@ -30,24 +30,14 @@ def bend(degrees: float) -> list[dict[str, Any]]:
     return [{"skeleton": {"at": NODE, "by": by, "fixed": ["inlet", "outlet", "artery"], "name": "angle"}}]
 
 
-def search(lower: float, upper: float, tolerance: float) -> study.Search:
-    """A search for the angle of the least drop, between two angles."""
-    return lambda drop, _: study.least(drop, (lower, upper), tolerance)
-
-
 def main() -> int:
     """The program."""
     parser = study.arguments(__doc__.splitlines()[0], "examples/flow/cases/bypass.json", 1.0, SCHEDULE, CRITERION)
     parser.set_defaults(set=list(VISCOSITY.items()))
-    parser.add_argument("--bounds", type=float, nargs=2, default=(-15.0, 20.0), help="degrees less, at least and most")
+    study.bounds(parser, -15.0, 20.0, "degrees less, at least and at most")
     given = parser.parse_args()
-    lower, upper = given.bounds
-    comparison = study.compare(study.flows(given), bend, search(lower, upper, given.tolerance))
-    study.tell(comparison, "angle")
-    if given.plot:
-        study.plot(comparison, "angle", given.plot)
-    first, second = comparison.values
-    return 0 if abs(first - second) <= 2 * given.tolerance else 1
+    comparison = study.compare(study.flows(given), bend, study.search(given))
+    return study.conclude(comparison, given, "angle", "degrees less")
 
 
 if __name__ == "__main__":

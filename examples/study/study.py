@@ -56,12 +56,12 @@ def begun(
     assert process.stdout is not None
     try:
         line = "it said nothing"
-        # The file with the link is there before the run says so.
-        while not (links := sorted(folder.glob("tombolo-*.link"))):
-            said = process.stdout.readline()
-            if not said:
-                raise RuntimeError(f"the flow ended before it opened its server: {line}")
-            line = said
+        for line in process.stdout:  # noqa: B007
+            # The file with the link is whole before the run says where it is.
+            if links := sorted(folder.glob("tombolo-*.link")):
+                break
+        else:
+            raise RuntimeError(f"the flow ended before it opened its server: {line}")
         yield links[0]
     finally:
         process.terminate()
@@ -104,16 +104,13 @@ class Flows(NamedTuple):
     @contextlib.contextmanager
     def begun(self, edits: Sequence[Mapping[str, Any]] = ()) -> Iterator[tombolo.Run]:
         """A client of a flow that begins in the shape of these edits; both are ended behind the block."""
-        orders = [
-            {"at": {"cycle": 0}, "parameter": {"name": name, "value": value}} for name, value in self.parameters.items()
-        ]
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            begun(
-                self.program, self.shaped(edits, Path(folder)), configuration(DROP, SHAPE), orders, Path(folder)
-            ) as link,
-            tombolo.connect(link) as run,
-        ):
+        at = {"cycle": 0}
+        orders = [{"at": at, "parameter": {"name": name, "value": value}} for name, value in self.parameters.items()]
+        with contextlib.ExitStack() as ended:
+            folder = Path(ended.enter_context(tempfile.TemporaryDirectory()))
+            case = self.shaped(edits, folder)
+            link = ended.enter_context(begun(self.program, case, configuration(DROP, SHAPE), orders, folder))
+            run = ended.enter_context(tombolo.connect(link))
             yield run
 
     def shaped(self, edits: Sequence[Mapping[str, Any]], folder: Path) -> Path:
@@ -125,8 +122,9 @@ class Flows(NamedTuple):
         shape.write_text(json.dumps(edits))
         files = ["--mesh", self.case.parent / case["mesh"], "--edits", shape, "--out", mesh]
         subprocess.run([sys.executable, "-m", "tombolo", "edit", *files], check=True, stdout=subprocess.DEVNULL)
-        # The case's own pipelines lie beside the case.
-        del case["pipelines"]
+        # These lie beside the case, and others are given in their place.
+        for name in ("pipelines", "orders"):
+            case.pop(name, None)
         file.write_text(json.dumps(case | {"mesh": str(mesh)}))
         return file
 
@@ -284,11 +282,29 @@ def compare(flows: Flows, edits: Edits, search: Search) -> Comparison:
     return Comparison(running, restarted, (first, search(restarted.drop, running.reference)))
 
 
-def least(drop: Ask, bounds: tuple[float, float], tolerance: float) -> float:
-    """The value of the least drop between two bounds, by Brent's method without derivatives."""
+def least(lower: float, upper: float, tolerance: float) -> Search:
+    """A search for the value of the least drop between two bounds, by Brent's method."""
     from scipy.optimize import minimize_scalar
 
-    return float(minimize_scalar(drop, bounds=bounds, method="bounded", options={"xatol": tolerance}).x)
+    def find(drop: Ask, _: float) -> float:
+        options = {"xatol": tolerance}
+        return float(minimize_scalar(drop, bounds=(lower, upper), method="bounded", options=options).x)
+
+    return find
+
+
+def sampled(lower: float, upper: float, trials: int) -> Search:
+    """The same by Optuna, which asks as often as it is told, and takes no answer for exact."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+
+    def find(drop: Ask, _: float) -> float:
+        search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=1))
+        search.optimize(lambda trial: drop(trial.suggest_float("value", lower, upper)), n_trials=trials)
+        return float(search.best_params["value"])
+
+    return find
 
 
 def arguments(
@@ -312,6 +328,18 @@ def arguments(
     return parser
 
 
+def bounds(parser: argparse.ArgumentParser, lower: float, upper: float, meaning: str) -> None:
+    """What studies that look for the least drop can be told too."""
+    parser.add_argument("--bounds", type=float, nargs=2, default=(lower, upper), help=meaning)
+    parser.add_argument("--trials", type=int, help="search by Optuna, where that is installed, with so many answers")
+
+
+def search(given: argparse.Namespace) -> Search:
+    """The search for the least drop that the command line asks for."""
+    lower, upper = given.bounds
+    return sampled(lower, upper, given.trials) if given.trials else least(lower, upper, given.tolerance)
+
+
 def flows(given: argparse.Namespace) -> Flows:
     """The flows that the command line asks for."""
     parameters = {name: float(value) for name, value in given.set}
@@ -329,6 +357,17 @@ def tell(comparison: Comparison, name: str) -> None:
             print(f"  {name} {answer.value:.4f}: {answer.drop:.3f} Pa, settled after {answer.steps} steps")
     print(f"steps, running / anew: {running.spent / restarted.spent:.2f} in all", end=", ")
     print(f"{running.mean / restarted.mean:.2f} for an answer, in the mean")
+
+
+def conclude(
+    comparison: Comparison, given: argparse.Namespace, name: str, unit: str, wanted: Optional[float] = None
+) -> int:
+    """Prints what came out, and draws it where that is asked for; the exit code: 0 where both ways agree."""
+    tell(comparison, name)
+    if given.plot:
+        plot(comparison, f"{name} [{unit}]", given.plot, wanted)
+    first, second = comparison.values
+    return 0 if abs(first - second) <= 2 * given.tolerance else 1
 
 
 def plot(comparison: Comparison, name: str, file: Path, wanted: Optional[float] = None) -> None:

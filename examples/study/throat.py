@@ -43,11 +43,7 @@ def main() -> int:
     comparison = study.compare(study.flows(given), throat, search(given.times, given.tolerance))
     wanted = given.times * comparison.running.reference
     print(f"wanted: {wanted:.3f} Pa")
-    study.tell(comparison, "height")
-    if given.plot:
-        study.plot(comparison, "height", given.plot, wanted)
-    first, second = comparison.values
-    return 0 if abs(first - second) <= 2 * given.tolerance else 1
+    return study.conclude(comparison, given, "height", "of the reference's", wanted)
 
 
 if __name__ == "__main__":

@@ -28,23 +28,13 @@ def widening(area: float) -> list[dict[str, Any]]:
     return [{"scale_direction": wide}]
 
 
-def search(lower: float, upper: float, tolerance: float) -> study.Search:
-    """A search for the area of the least drop, between two areas."""
-    return lambda drop, _: study.least(drop, (lower, upper), tolerance)
-
-
 def main() -> int:
     """The program."""
     parser = study.arguments(__doc__.splitlines()[0], "examples/flow/cases/pipe.json", 0.05, SCHEDULE, CRITERION)
-    parser.add_argument("--bounds", type=float, nargs=2, default=(1.0, 3.0), help="the least and the largest area")
+    study.bounds(parser, 1.0, 3.0, "the least and the largest area")
     given = parser.parse_args()
-    lower, upper = given.bounds
-    comparison = study.compare(study.flows(given), widening, search(lower, upper, given.tolerance))
-    study.tell(comparison, "area")
-    if given.plot:
-        study.plot(comparison, "area", given.plot)
-    first, second = comparison.values
-    return 0 if abs(first - second) <= 2 * given.tolerance else 1
+    comparison = study.compare(study.flows(given), widening, study.search(given))
+    return study.conclude(comparison, given, "area", "of the reference's")
 
 
 if __name__ == "__main__":
