@@ -38,6 +38,8 @@ const behind = async (part) => {
       for (let node = walker.nextNode(); node; node = walker.nextNode()) {
         if (end <= node.length) {
           getSelection().collapse(node, end);
+          // Said at once: an editor that draws before it has heard of the new cursor puts the old one back.
+          document.dispatchEvent(new Event("selectionchange"));
           return true;
         }
         end -= node.length;
@@ -46,8 +48,6 @@ const behind = async (part) => {
     return false;
   }, part);
   check(found, `the text has no ${part}: ${await text()}`);
-  // The editor hears of it a moment later.
-  await page.waitForTimeout(50);
 };
 const outcome = (words) => anna.holds(`"${words}" from the run`, (said) => document.getElementById("pipeline-outcome").textContent.includes(said), words);
 /** Has the messages that list the views, but for the first, come later than the frames after them. */
