@@ -27,8 +27,13 @@ try {
   page.setDefaultTimeout(120_000);
   const network = await page.context().newCDPSession(page);
   await network.send("Network.enable");
+  // The files of the viewer; what the run tells beside them grows with its mesh.
   let wire = 0;
-  network.on("Network.loadingFinished", ({ encodedDataLength }) => { wire += encodedDataLength; });
+  const files = new Set();
+  network.on("Network.responseReceived", ({ requestId, response }) => {
+    if (/\/$|\.(html|js|css|wasm|svg|png|ico)$/.test(new URL(response.url).pathname)) files.add(requestId);
+  });
+  network.on("Network.loadingFinished", ({ requestId, encodedDataLength }) => { if (files.has(requestId)) wire += encodedDataLength; });
   await page.addInitScript(() => {
     window.longest = 0;
     new PerformanceObserver((list) => { for (const task of list.getEntries()) window.longest = Math.max(window.longest, task.duration); }).observe({ type: "longtask" });

@@ -14,7 +14,7 @@ use crate::peer::{self, mesh_file};
 use crate::report::{Report, Row, Target};
 
 /// Slices of the channel of 60 000 tetrahedra that have 200 000 triangles together.
-const PLANES: usize = 60;
+const PLANES: usize = 32;
 
 /// The figures that `benchmarks/browser/viewer.mjs` prints, of one run: seconds, or bytes.
 #[derive(Deserialize)]
