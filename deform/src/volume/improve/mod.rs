@@ -183,15 +183,16 @@ impl Improver {
         if sweeps == 0 || least.is_nan() || least <= 0.0 || least >= self.good {
             return false;
         }
-        let held = self.held(&near);
+        let fixed = self.least_fixed(&near);
         let sweeping = Sweeps::new(self);
-        let (mut last, mut kept) = (before, near.clone());
-        let (mut tried, mut has_gained) = (0, false);
-        if !self.untiring && before.are_enough(held) {
+        // The points of the last sweep that has gained something; a rank may have none to move.
+        let (mut kept, mut has_gained) = (Vec::new(), false);
+        let (mut last, mut tried) = (before, 0);
+        if !self.untiring && before.are_enough(fixed) {
             tried = self.colours.len().min(1);
             sweeping.through(&mut near, 0..tried, least);
             let part = 1.0 / self.colours.len().max(1) as f64;
-            if !self.qualities(&near).are_worth_more(&before, held, part) {
+            if !self.qualities(&near).are_worth_more(&before, fixed, part) {
                 return false;
             }
         }
@@ -199,9 +200,9 @@ impl Improver {
             sweeping.through(&mut near, tried..self.colours.len(), last.least);
             tried = 0;
             let now = self.qualities(&near);
-            let worth = self.untiring || now.are_worth_more(&last, held, 1.0);
-            if worth || now.are_better(&last, held) {
-                kept.copy_from_slice(&near);
+            let worth = self.untiring || now.are_worth_more(&last, fixed, 1.0);
+            if worth || now.are_better(&last, fixed) {
+                kept.clone_from(&near);
                 (last, has_gained) = (now, true);
             }
             if !worth {

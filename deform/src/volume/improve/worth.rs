@@ -40,27 +40,29 @@ impl Qualities {
         }
     }
 
-    /// Whether the least is as high as it should be, or as the mesh can have it, whose cells that
-    /// cannot be moved have `held`: it is the mean that counts from there on.
-    pub(super) fn are_enough(&self, held: f64) -> bool {
-        self.least + REST >= held.min(ENOUGH)
+    /// Whether the least quality is high enough, or as high as that of the cells that cannot be moved,
+    /// `fixed`: it is the mean that counts from there on.
+    pub(super) fn are_enough(&self, fixed: f64) -> bool {
+        self.least + REST >= fixed.min(ENOUGH)
     }
 
     /// Whether these are so much better than those `before` a sweep, or a part of one, that the
     /// sweep was worth it.
-    pub(super) fn are_worth_more(&self, before: &Self, held: f64, part: f64) -> bool {
+    pub(super) fn are_worth_more(&self, before: &Self, fixed: f64, part: f64) -> bool {
         let gain = (self.sum - before.sum) / before.worn.max(1.0);
-        gain >= part * GAIN || !before.are_enough(held) && gain.max(self.rise(before, held)) >= REST
+        gain >= part * GAIN
+            || !before.are_enough(fixed) && gain.max(self.rise(before, fixed)) >= REST
     }
 
     /// Whether the mesh is better by these than by those `before`.
-    pub(super) fn are_better(&self, before: &Self, held: f64) -> bool {
-        self.sum > before.sum || self.rise(before, held) >= REST
+    pub(super) fn are_better(&self, before: &Self, fixed: f64) -> bool {
+        self.sum > before.sum || self.rise(before, fixed) >= REST
     }
 
-    /// By how much the least quality of the mesh has risen.
-    fn rise(&self, before: &Self, held: f64) -> f64 {
-        self.least.min(held) - before.least.min(held)
+    /// By how much the least quality of the mesh has risen, whose cells that cannot be moved have
+    /// `fixed`.
+    fn rise(&self, before: &Self, fixed: f64) -> f64 {
+        self.least.min(fixed) - before.least.min(fixed)
     }
 }
 
@@ -90,12 +92,12 @@ impl Improver {
 
     /// The least quality of the cells that cannot be moved: the mesh keeps it, whatever the others
     /// gain. Collective.
-    pub(super) fn held(&self, points: &[Vector]) -> f64 {
+    pub(super) fn least_fixed(&self, points: &[Vector]) -> f64 {
         let quality = |&simplex: &u32| self.simplices[simplex as usize].least(points);
-        let mut held = [self.fixed.iter().map(quality).fold(f64::INFINITY, f64::min)];
-        if let Some(Interface { held: shared, .. }) = &self.interface {
-            shared.halo().communicator().reduce(Reduction::Minimum, &mut held);
+        let mut least = [self.fixed.iter().map(quality).fold(f64::INFINITY, f64::min)];
+        if let Some(Interface { held, .. }) = &self.interface {
+            held.halo().communicator().reduce(Reduction::Minimum, &mut least);
         }
-        held[0]
+        least[0]
     }
 }
