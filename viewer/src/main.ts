@@ -320,7 +320,8 @@ const decoder = new Decoder(worker as unknown as DecodeWorker, {
 });
 
 function takeMessage(message: ServerMessage): void {
-  bar.alive();
+  // The bar looks itself whether there is news in a status.
+  if (message.kind !== "status") bar.alive();
   switch (message.kind) {
     case "hello": return takeHello(message.body);
     case "status": return store.dispatch({ type: "status", status: message.body, at: performance.now() });

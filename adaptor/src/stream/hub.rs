@@ -131,6 +131,8 @@ pub(super) struct HubState {
     pub(super) last_status: Option<(u64, Instant)>,
     pub(super) status_dirty: bool,
     pub(super) status_told: Option<Instant>,
+    /// The seconds of a step, as they were measured last.
+    pub(super) step_seconds: Option<f64>,
     end: End,
     closed: bool,
 }

@@ -16,17 +16,20 @@ use crate::lock::lock;
 const SIGN_OF_LIFE: Duration = Duration::from_secs(10);
 
 impl Hub {
-    /// Puts a status into every outbox if anything in it changed, or none was told for ten seconds.
-    /// Called a few times a second.
+    /// Puts a status into every outbox if anything in it changed, and into those of viewers if none
+    /// was told for ten seconds. Called a few times a second.
     pub(crate) fn status(&self) {
         // The solver could wait for the lock: what is told is copied under it, and written later.
-        let Some(status) = self.new_status() else { return };
+        let Some((is_news, status)) = self.new_status() else { return };
         let text = Text::of(move || json!({ "status": status() }));
-        lock(&self.state).audience().for_each(|client| client.status(&text));
+        let state = lock(&self.state);
+        state.clients.values().for_each(|client| client.status(&text));
+        // A recording of a run that rests does not grow.
+        state.observer.iter().filter(|_| is_news).for_each(|observer| observer.status(&text));
     }
 
-    /// The status, where it is to be told.
-    fn new_status(&self) -> Option<impl FnOnce() -> Map<String, Value> + Send + use<>> {
+    /// The status, where it is to be told, and whether anything in it has changed.
+    fn new_status(&self) -> Option<(bool, impl FnOnce() -> Map<String, Value> + Send + use<>)> {
         let (cycle, time) = self.clock.get();
         let mut state = lock(&self.state);
         if !state.has_audience() {
@@ -35,25 +38,28 @@ impl Hub {
         }
         let now = Instant::now();
         let before = state.last_status;
+        let is_news = before.is_none_or(|(last, _)| last != cycle) || state.status_dirty;
         let is_late = state.status_told.is_none_or(|told| now.duration_since(told) >= SIGN_OF_LIFE);
-        if before.is_some_and(|(last, _)| last == cycle) && !state.status_dirty && !is_late {
+        if !is_news && !is_late {
             return None;
         }
         (state.status_dirty, state.status_told) = (false, Some(now));
         // Measured over the steps since the last status, so that the solver need not look at a
         // clock for it.
-        let step_seconds = before.and_then(|(last, at)| {
+        let measured = before.and_then(|(last, at)| {
             let steps = cycle.checked_sub(last).filter(|&steps| steps > 0)?;
             #[expect(clippy::cast_precision_loss, reason = "steps of a fraction of a second")]
             Some(now.duration_since(at).as_secs_f64() / steps as f64)
         });
+        state.step_seconds = measured.or(state.step_seconds);
+        let step_seconds = state.step_seconds;
         if before.is_none_or(|(last, _)| last != cycle) {
             state.last_status = Some((cycle, now));
         }
         let mut status = state.conditions.clone();
         let (viewers, driver) = (state.clients.len(), state.wheel.driver());
         let (journal_lost, costs) = (state.journal_lost.clone(), state.costs.clone());
-        Some(move || {
+        let told = move || {
             status.insert("cycle".into(), cycle.into());
             status.insert("time".into(), time.into());
             status.insert("step_seconds".into(), step_seconds.into());
@@ -66,7 +72,8 @@ impl Hub {
             };
             status.insert("pipelines".into(), costs.iter().map(pipeline).collect());
             status
-        })
+        };
+        Some((is_news, told))
     }
 }
 
@@ -75,16 +82,26 @@ mod tests {
     use super::*;
     use crate::stream::{credentials::Access, hub::Arrival};
 
+    /// Whether a status is told, and whether it has news.
+    fn told(hub: &Hub) -> Option<(bool, Value)> {
+        hub.new_status().map(|(is_news, status)| (is_news, status().into()))
+    }
+
     #[test]
     fn a_status_is_told_again_where_none_was_told_for_long() {
         let hub = Hub::default();
         let Ok(Arrival::Client(_viewer)) = hub.join(1, Access::Watch, None) else {
             panic!("there is room for a viewer")
         };
-        assert!(hub.new_status().is_some());
-        assert!(hub.new_status().is_none());
+        assert!(told(&hub).is_some_and(|(is_news, _)| is_news));
+        std::thread::sleep(Duration::from_millis(1));
+        hub.clock.set(1, 0.1);
+        let (is_news, first) = told(&hub).expect("a step is news");
+        assert!(is_news && first["step_seconds"].as_f64() > Some(0.0), "{first}");
+        assert!(told(&hub).is_none());
         lock(&hub.state).status_told = Instant::now().checked_sub(SIGN_OF_LIFE);
-        assert!(hub.new_status().is_some());
-        assert!(hub.new_status().is_none());
+        // No step was taken meanwhile, and what is known of steps is not forgotten for it.
+        assert_eq!(told(&hub), Some((false, first)));
+        assert!(told(&hub).is_none());
     }
 }

@@ -7,6 +7,7 @@ import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { runState, slowLink, titleOf, whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
+import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 
 const CONNECTIONS: Record<ConnectionState, string> = {
@@ -23,12 +24,13 @@ export class StatusBar {
   constructor(private readonly store: Store<State, Action>, commands: Commands) {
     part("pause").addEventListener("click", () => commands.pauseOrResume());
     store.watch((state) => state.connection, () => this.alive());
-    store.watch((state) => state.status, () => this.alive());
+    // A status comes also where the solver has taken no step: then it is a sign of the server alone.
+    store.watch(({ status }) => [status?.cycle, status?.paused, status?.stopped], () => this.alive(), sameJson);
     store.watch((state) => state, (state) => this.show(state));
     setInterval(() => this.silence(), 1000);
   }
 
-  /** Something arrived, whatever it was. */
+  /** The simulation has said something. */
   alive(): void {
     this.heard = performance.now();
     this.silence();

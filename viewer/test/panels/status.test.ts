@@ -1,5 +1,5 @@
 // @vitest-environment jsdom
-import { beforeEach, describe, expect, it } from "vitest";
+import { beforeEach, describe, expect, it, vi } from "vitest";
 import { StatusBar } from "../../src/panels/status";
 import { WheelPanel } from "../../src/panels/wheel";
 import { STATUS, page } from "../page";
@@ -33,6 +33,25 @@ describe("the bar", () => {
     expect(at("run").textContent).toBe("unknown");
     expect(at("banner-text").textContent).toBe("The connection was lost. Whether the run goes on is unknown. Trying again.");
     expect(at("pause").disabled).toBe(true);
+  });
+
+  it("says that a simulation takes no step, though its server says that it is there", () => {
+    vi.useFakeTimers();
+    try {
+      const { store, commands } = page();
+      new StatusBar(store, commands);
+      const told = (cycle: number): void => store.dispatch({ type: "status", status: { ...STATUS, cycle, step_seconds: 0.1 }, at: 0 });
+      store.dispatch({ type: "connection", state: "connected", explanation: "" });
+      told(8);
+      vi.advanceTimersByTime(10_000);
+      told(8);
+      vi.advanceTimersByTime(2000);
+      expect(at("silence").textContent).toBe("The simulation has not said a word for 12 s. The picture may be old.");
+      told(9);
+      expect(at("silence").hidden).toBe(true);
+    } finally {
+      vi.useRealTimers();
+    }
   });
 
   it("hands the wheel over, or keeps it, once another asks", () => {
