@@ -4,7 +4,7 @@ use std::{
     io::{IsTerminal, Read, Write},
     num::NonZeroU32,
     path::{Path, PathBuf},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
 };
 use clap::Args;
 
-use super::{ANSWER, Target, failed, refused, steer};
+use super::{ANSWER, NOT_YET, Target, failed, refused, steer};
 use crate::program::{Failure, read, say};
 
 /// How long the bar is, in characters.
@@ -80,7 +80,7 @@ pub(crate) fn order(options: &Options) -> Result<(), Failure> {
 }
 
 /// Gives an order in the place of another. Without waiting for its shapes it ends once the run has put
-/// it there.
+/// it there, or says that the solver has not come so far.
 pub(crate) fn replace(options: &ReplaceOptions) -> Result<(), Failure> {
     let order = read_order(&options.file)?;
     let client = steer(&options.target)?;
@@ -166,8 +166,17 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
     // The run first takes the order, and then has it take the place of another.
     let mut is_placed = order.replaces.is_none();
     let mut is_taken = false;
+    let begun = Instant::now();
     loop {
-        let told = next(client, if wait { WAIT } else { ANSWER })?;
+        // What else is told does not make the wait for the place longer.
+        let left = if wait { WAIT } else { ANSWER.saturating_sub(begun.elapsed()) };
+        let told = match client.next(left).map_err(failed)? {
+            Some(told) => told,
+            None if is_taken && !wait => {
+                return if as_json { Ok(()) } else { say(NOT_YET) };
+            }
+            None => return Err(no_answer(if wait { WAIT } else { ANSWER })),
+        };
         let report = match &told.event {
             Event::Order(report) if report.id == id => report,
             Event::Order(other) if order.replaces.as_ref() == Some(&other.id) => {
@@ -215,7 +224,11 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
 
 fn next(client: &Client, patience: Duration) -> Result<Received, Failure> {
     let told = client.next(patience).map_err(failed)?;
-    told.ok_or_else(|| Failure::Wrong(format!("no answer within {} seconds", patience.as_secs())))
+    told.ok_or_else(|| no_answer(patience))
+}
+
+fn no_answer(patience: Duration) -> Failure {
+    Failure::Wrong(format!("no answer within {} seconds", patience.as_secs()))
 }
 
 /// How far an order has come, in one line.

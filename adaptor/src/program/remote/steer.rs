@@ -7,7 +7,7 @@ use crate::{
 use clap::Args;
 use serde_json::json;
 
-use super::{ANSWER, Target, failed, refused, steer};
+use super::{ANSWER, NOT_YET, Target, failed, refused, steer};
 use crate::program::{Failure, say};
 
 #[derive(Debug, Args)]
@@ -64,7 +64,7 @@ fn give(target: &Target, command: &Command, done: &str) -> Result<(), Failure> {
         (_, true) => {
             say(cycle.map_or_else(|| done.into(), |cycle| format!("{done} at cycle {cycle}")))
         }
-        _ => say("taken: it takes effect at the solver's next safe point"),
+        _ => say(NOT_YET),
     };
     loop {
         if let Some(cycle) = seen(&client, command) {
