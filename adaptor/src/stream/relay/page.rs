@@ -21,17 +21,18 @@ const NOTE: &str = "</div><p>A run opens with its own link, which it has printed
 
 /// Keeps the list new, and leaves the focus where it is as long as the list is the same.
 const SCRIPT: &str = r#"const list = document.getElementById("runs");
-setInterval(async () => {
+async function renew() {
   try {
-    const answer = await fetch(".", { cache: "no-store" });
-    if (!answer.ok) return;
-    const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+    const answer = await fetch(".", { cache: "no-store", signal: AbortSignal.timeout(10000) });
+    const page = new DOMParser().parseFromString(answer.ok ? await answer.text() : "", "text/html");
     const runs = page.getElementById("runs");
     if (runs && runs.innerHTML !== list.innerHTML) list.innerHTML = runs.innerHTML;
   } catch {
     // The relay is away for a moment.
   }
-}, 5000);
+  setTimeout(renew, 5000);
+}
+setTimeout(renew, 5000);
 "#;
 
 /// The runs as a page. Their names hold nothing that means something in HTML.
