@@ -155,33 +155,19 @@ def run(solver):
         yield connected
 
 
-# Meshes coarser than those that scripts/meshes has by name.
-COARSE = """
-import runpy, sys
-import gmsh
-meshes = runpy.run_path(sys.argv[1])
-geometry, size, folder = sys.argv[2:]
-gmsh.initialize(interruptible=False)
-meshes["generate"](meshes[geometry], float(size))
-gmsh.model.mesh.optimize("Netgen")
-meshes["write"](geometry, folder, "4.1")
-gmsh.finalize()
-"""
-
-
 @pytest.fixture
 def small_case(tmp_path):
-    """Makes a case of the flow on a coarse mesh."""
+    """Makes a case of the flow on a mesh of scripts/meshes."""
 
-    def make(name, geometry, size, **changes):
+    def make(name, mesh, **changes):
         if not FLOW.exists():
             pytest.skip("the program flow is not built: cargo build -p tombolo-flow")
         pytest.importorskip("gmsh")
-        command = [sys.executable, "-c", COARSE, PROJECT / "scripts/meshes", geometry, str(size), tmp_path]
-        subprocess.run(command, check=True)
+        command = [sys.executable, PROJECT / "scripts/meshes", mesh, "--out", tmp_path]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         cases = EXAMPLES / "flow/cases"
         case = json.loads((cases / f"{name}.json").read_text())
-        case |= {"mesh": f"{geometry}.msh", "pipelines": str(cases / case["pipelines"]), **changes}
+        case |= {"mesh": f"{mesh}.msh", "pipelines": str(cases / case["pipelines"]), **changes}
         file = tmp_path / f"{name}.json"
         file.write_text(json.dumps(case))
         return file
@@ -192,4 +178,4 @@ def small_case(tmp_path):
 @pytest.fixture
 def small_nozzle(small_case):
     """The case of the nozzle on a coarse mesh."""
-    return small_case("nozzle", "channel", 0.0198)
+    return small_case("nozzle", "channel-5k")

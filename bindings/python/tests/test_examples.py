@@ -121,7 +121,7 @@ def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
     widening = load("study/widening.py")
     # At half the density the stream keeps to the wall between these areas: the widest regains most.
     density, speed, lower, upper = 500, 0.15625, 1.2, 2.0
-    case = small_case("pipe", "pipe", 0.011, density=density, time_step=0.02)
+    case = small_case("pipe", "pipe-4k", density=density, time_step=0.02)
     flows = study.Flows(FLOW, case, {}, 5, widening.CRITERION, timeout=300)
     found = study.compare(flows, widening.widening, study.least(lower, upper, tolerance=0.1))
 
@@ -142,7 +142,7 @@ def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
 def test_an_angle_is_found_on_a_running_flow_and_with_restarts(small_case):
     pytest.importorskip("scipy")
     angle = load("study/angle.py")
-    case = small_case("bypass", "bypass", 0.0024)
+    case = small_case("bypass", "bypass-8k")
     flows = study.Flows(FLOW, case, angle.VISCOSITY, angle.SCHEDULE, angle.CRITERION, timeout=300)
     found = study.compare(flows, angle.bend, study.least(-10, 10, tolerance=2))
 
