@@ -7,7 +7,7 @@ use std::process::Command;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::{Value, json};
-use tombolo_tests::{Proxy, Run, Small, driving, free_port, program, project};
+use tombolo_tests::{Proxy, Run, Small, driving, free_ports, program, project};
 
 /// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
@@ -133,8 +133,8 @@ fn the_end_of_a_run_in_a_browser() {
 #[test]
 fn runs_behind_a_relay_and_a_proxy_in_a_browser() {
     let _alone = alone();
-    let (relay_port, public_port) = (free_port(), free_port());
-    let proxy = Proxy::start("/tombolo/", relay_port);
+    let [relay_port, proxy_port, public_port] = free_ports();
+    let _proxy = Proxy::start(proxy_port, "/tombolo/", relay_port);
     let directory = tempfile::TempDir::new().expect("a temporary directory");
     let mut relay = Run::start(
         program("tombolo")
@@ -168,7 +168,7 @@ fn runs_behind_a_relay_and_a_proxy_in_a_browser() {
     let variables = [
         ("TOMBOLO_PAGE", page),
         ("TOMBOLO_OTHER", links[1].clone()),
-        ("TOMBOLO_NETWORK", format!("{public_port} {}", proxy.port)),
+        ("TOMBOLO_NETWORK", format!("{public_port} {proxy_port}")),
     ];
     drive_at("relay.mjs", &links[0], &runs[0].1, &variables);
     for (_, run) in &mut runs[1..] {

@@ -294,7 +294,7 @@ def least(lower: float, upper: float, tolerance: float) -> Search:
 
 
 def sampled(lower: float, upper: float, trials: int) -> Search:
-    """The same by Optuna, which asks as often as it is told, and takes no answer for exact."""
+    """A search for the value of the least drop by Optuna, which asks so often, and takes no answer for exact."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)

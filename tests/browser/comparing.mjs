@@ -12,7 +12,7 @@ import { Viewer, check, launch, link, run } from "./page.mjs";
 const browser = await launch();
 const viewer = await Viewer.open(browser, "comparing", { acceptDownloads: true });
 const { page } = viewer;
-// Read in one go: the run goes on, and every new picture fills the table anew.
+// Read in one go: the run goes on, and with it what the table says.
 const rows = () => page.evaluate(() => [...document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")));
 /** The numbers of a row of the table beside the plot. */
 const numbers = (row) => row.split("\t").slice(1).map((text) => Number(text.trim().replace("−", "-")));

@@ -2,7 +2,7 @@
  * Reaches runs through a relay behind a proxy under a path, in Debian's Chromium: the list of runs, an order, undo, reload, half a
  * minute without a network, and another run beside it.
  *
- *     TOMBOLO_URL=https://localhost:7443/tombolo/nozzle/?token=... TOMBOLO_OTHER=... TOMBOLO_PAGE=https://localhost:7443/tombolo/?token=... \\
+ *     TOMBOLO_URL=https://localhost:7443/tombolo/nozzle/?token=... TOMBOLO_OTHER=... TOMBOLO_PAGE=https://localhost:7443/tombolo/?token=... \
  *         TOMBOLO_NETWORK="7443 8443" node tests/browser/relay.mjs
  *
  * TOMBOLO_OTHER is the link of another run, TOMBOLO_PAGE that of the relay's page. TOMBOLO_NETWORK are the port of these links and the
@@ -69,6 +69,11 @@ const steps = [
     const noticed = Date.now() - begun;
     check(noticed > 15_000, `the network was cut, and the connection with it, in ${noticed} ms`);
     check(/unknown/.test(await viewer.text("#banner-text")), `the page says "${await viewer.text("#banner-text")}"`);
+    const isSeen = await page.evaluate(() => {
+      const box = document.getElementById("banner-text").getBoundingClientRect();
+      return document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2)?.closest("#banner") !== null;
+    });
+    check(isSeen, "something lies over what the page says of the connection");
     check(await page.locator("#pause").isDisabled(), "an order could be given to a run that is not reached");
     await viewer.picture("without-network");
     await page.waitForTimeout(Math.max(0, AWAY - noticed));

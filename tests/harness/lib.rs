@@ -16,7 +16,7 @@ pub use command::{install, library, output, succeed};
 pub use curves::CurveGraph;
 pub use generated::{generated_mesh, generated_surfaces};
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
-pub use proxy::{Proxy, free_port};
+pub use proxy::{Proxy, free_ports};
 pub use run::{Run, program, programs, tombolo};
 pub use small::Small;
 pub use viewer::{Link, Message, Viewer, driving};

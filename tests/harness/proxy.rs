@@ -1,8 +1,8 @@
 //! A reverse proxy with a certificate, as a site puts one before its services.
 
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
 use std::process::Command;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 use tempfile::TempDir;
@@ -20,17 +20,15 @@ const SERVICE: &str = "http://unix:/run/tombolo/nozzle.sock:/";
 pub struct Proxy {
     _run: Run,
     _directory: TempDir,
-    /// The port that it listens on.
-    pub port: u16,
 }
 
 impl Proxy {
-    /// Passes what is asked for below `path` on to a port of this machine.
+    /// Passes what is asked for below `path` of one port of this machine on to another port.
     ///
     /// # Panics
     /// Where nginx does not start.
     #[must_use]
-    pub fn start(path: &str, to: u16) -> Proxy {
+    pub fn start(port: u16, path: &str, to: u16) -> Proxy {
         let directory = TempDir::new().expect("a temporary directory");
         let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]);
         let made = made.expect("a certificate can be made");
@@ -43,7 +41,6 @@ impl Proxy {
         let (block, _) = rest.split_once("```").expect("the block ends");
         assert!(block.contains(PATH) && block.contains(SERVICE), "{block}");
         let block = block.replace(PATH, path).replace(SERVICE, &format!("http://127.0.0.1:{to}/"));
-        let port = free_port();
         let folders = ["client_body", "proxy", "fastcgi", "uwsgi", "scgi"]
             .map(|kind| format!("{kind}_temp_path {kind};\n"))
             .concat();
@@ -59,29 +56,28 @@ impl Proxy {
         nginx.arg("-p").arg(directory.path()).args(["-e", "stderr", "-c", "nginx.conf"]);
         let mut run = Run::start(&mut nginx);
         let begun = Instant::now();
-        while std::net::TcpStream::connect(("127.0.0.1", port)).is_err() {
+        while TcpStream::connect(("127.0.0.1", port)).is_err() {
             assert!(run.is_running() && begun.elapsed() < PATIENCE, "nginx:\n{}", run.text());
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(20));
         }
-        Proxy { _run: run, _directory: directory, port }
+        Proxy { _run: run, _directory: directory }
     }
 }
 
 /// The text form of a certificate or a key.
 fn pem(kind: &str, bytes: &[u8]) -> String {
     let text = BASE64_STANDARD.encode(bytes);
-    // Whole characters: it is ASCII.
     let lines: Vec<&str> =
         text.as_bytes().chunks(64).filter_map(|line| std::str::from_utf8(line).ok()).collect();
     format!("-----BEGIN {kind}-----\n{}\n-----END {kind}-----\n", lines.join("\n"))
 }
 
-/// A port of this machine on which nothing listened just now.
+/// Ports of this machine on which nothing listened just now, no two the same.
 ///
 /// # Panics
-/// Where there is none.
+/// Where there are none.
 #[must_use]
-pub fn free_port() -> u16 {
-    let listener = TcpListener::bind(("127.0.0.1", 0)).expect("there are free ports");
-    listener.local_addr().expect("it has an address").port()
+pub fn free_ports<const COUNT: usize>() -> [u16; COUNT] {
+    let bound = [(); COUNT].map(|()| TcpListener::bind(("127.0.0.1", 0)).expect("a free port"));
+    bound.map(|listener| listener.local_addr().expect("it has an address").port())
 }
