@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 import tombolo
-from conftest import SQUEEZE, box, ends
+from conftest import PROJECT, SQUEEZE, box, ends
 
 meshio = pytest.importorskip("meshio")
 POINTS, TETS = box(4)
@@ -127,6 +127,67 @@ def test_meshes_of_others_are_taken(tmp_path):
     sphere = pyvista.Sphere()
     turned = tombolo.Shaper(sphere, angle=170).shape([{"displacement": {"vertices": [0], "values": [[0, 0, 0.05]]}}])
     assert turned.points.shape == (sphere.n_points, 3)
+
+
+def features_of_program(file):
+    told = program("features", "--mesh", file, "--json")
+    assert told.returncode == 0, told.stderr
+    return [(it["name"], it["faces"], it["vertices"]) for it in json.loads(told.stdout)["features"]]
+
+
+def features_of(mesh):
+    return [(it["name"], it["faces"], it["vertices"]) for it in tombolo.Shaper(mesh).features]
+
+
+@pytest.mark.parametrize("version", ["2.2", "2.2-ascii", "4.1", "4.1-ascii"])
+def test_physical_surfaces_of_gmsh_are_features_by_name(version, tmp_path):
+    pytest.importorskip("gmsh")
+    command = [sys.executable, PROJECT / "scripts/meshes", "channel-5k", "--out", tmp_path, "--format", version]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    file = tmp_path / "channel-5k.msh"
+    mesh = meshio.read(file)
+    found = features_of(mesh)
+    assert [name for name, *_ in found] == ["inlet", "upstream", "throat", "downstream", "outlet"]
+    assert found == features_of_program(file)
+    # The numbers alone, and then not even those.
+    mesh.field_data = {}
+    assert [name for name, *_ in features_of(mesh)] == [f"feature-{number}" for number in range(1, 6)]
+    assert len(tombolo.Shaper(mesh).scaled_jacobians()) == sum(len(it.data) for it in mesh.cells if it.type == "tetra")
+    mesh.cell_data = {}
+    assert features_of(mesh) == features_of(meshio.Mesh(mesh.points, [("tetra", mesh.get_cells_type("tetra"))]))
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_groups_of_gmsh_of_every_kind_are_those_of_the_program(version, dimension, tmp_path):
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+        # Triangles and quadrangles: the sides of an extruded square.
+        square = gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.extrude([(2, square)], 0, 0, 1, numElements=[3], recombine=True)
+        gmsh.model.occ.synchronize()
+        surfaces = [tag for _, tag in gmsh.model.getEntities(2)]
+        # In no order, one without a name, a curve's name too, a face in two groups, and a face in a group of no name.
+        gmsh.model.addPhysicalGroup(2, surfaces[:1], 7, "foot")
+        gmsh.model.addPhysicalGroup(2, surfaces[1:3], 3, "two sides")
+        gmsh.model.addPhysicalGroup(2, surfaces[2:4], 2, "again")
+        gmsh.model.addPhysicalGroup(2, surfaces[4:], 9)
+        gmsh.model.addPhysicalGroup(1, [gmsh.model.getEntities(1)[0][1]], 4, "edge")
+        if dimension == 3:
+            gmsh.model.addPhysicalGroup(3, [gmsh.model.getEntities(3)[0][1]], 7, "inside")
+        gmsh.model.mesh.generate(dimension)
+        gmsh.write(str(tmp_path / "groups.msh"))
+    finally:
+        gmsh.finalize()
+    mesh = meshio.read(tmp_path / "groups.msh")
+    assert {"triangle", "quad"} <= {block.type for block in mesh.cells} or dimension == 2
+    found = features_of(mesh)
+    assert found == features_of_program(tmp_path / "groups.msh")
+    assert {"foot", "two sides", "feature-9"} <= {name for name, *_ in found}
 
 
 def test_what_would_break_the_mesh_is_rejected_and_forecast():

@@ -76,15 +76,49 @@ class Skeleton(NamedTuple):
         return f"<tombolo.Skeleton: {len(self.nodes)} nodes on {len(self.curves)} curves>"
 
 
+#: The dimension of each of meshio's types that may stand beside the cells of a mesh.
+_DIMENSIONS = {
+    **{"vertex": 0, "line": 1, "triangle": 2, "quad": 2},
+    **{"tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3},
+}
+
+
 def _of_meshio(mesh: Any) -> Mesh:
-    highest = {"triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
-    parts: dict[Union[str, int], list[Any]] = {}
-    for block in mesh.cells:
-        parts.setdefault(block.type, []).append(block.data)
-    # Faces and edges beside volume cells are of the boundary.
-    most = max((highest.get(kind, 0) for kind in map(str, parts)), default=0)
-    cells = {kind: np.concatenate(rows) for kind, rows in parts.items() if highest.get(str(kind), most) == most}
-    return Mesh(mesh.points, cells)
+    is_gmsh = "gmsh:physical" in mesh.cell_data
+    groups = mesh.cell_data["gmsh:physical"] if is_gmsh else [np.zeros(len(block.data), int) for block in mesh.cells]
+    blocks: dict[str, list[tuple[NDArray[Any], NDArray[Any]]]] = {}
+    for block, numbers in zip(mesh.cells, groups):
+        blocks.setdefault(block.type, []).append((block.data, numbers))
+    parts: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
+    for kind, of_kind in blocks.items():
+        rows, numbers = (np.concatenate(arrays) for arrays in zip(*of_kind))
+        if is_gmsh:
+            # Version 2.2 has a cell of several groups once for each: the first holds.
+            first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
+            rows, numbers = rows[first], numbers[first]
+        parts[kind] = rows, numbers
+    # Faces and edges beside volume cells are of the boundary. A type that is not known is kept, and refused by name.
+    most = max((_DIMENSIONS.get(kind, 0) for kind in parts), default=0)
+    cells: dict[Union[str, int], ArrayLike] = {
+        kind: rows for kind, (rows, _) in parts.items() if _DIMENSIONS.get(kind, most) == most
+    }
+    return Mesh(mesh.points, cells, faces=_physical_surfaces(mesh.field_data, parts))
+
+
+def _physical_surfaces(
+    named: Mapping[str, Any], parts: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]
+) -> Optional[dict[str, dict[Union[str, int], ArrayLike]]]:
+    """The surfaces of Gmsh's groups, as the program takes them from the file: in the order of their numbers."""
+    found: dict[int, dict[Union[str, int], ArrayLike]] = {}
+    for kind, (rows, numbers) in parts.items():
+        if _DIMENSIONS.get(kind) == 2:
+            # 0 is that of no group; one below 0 says that a surface is turned round in its group.
+            for number in np.unique(np.abs(numbers[numbers != 0])):
+                found.setdefault(int(number), {})[kind] = rows[np.abs(numbers) == number]
+    if not found:
+        return None
+    names = {int(number): name for name, (number, dimension) in named.items() if dimension == 2}
+    return {names.get(number, f"feature-{number}"): found[number] for number in sorted(found)}
 
 
 def _of_pyvista(mesh: Any) -> Mesh:
@@ -104,7 +138,8 @@ class Shaper:
     Parameters
     ----------
     mesh : Mesh, meshio.Mesh, pyvista mesh, or array of shape (n, 2) or (n, 3)
-        The mesh, or the coordinates of its vertices. It is copied.
+        The mesh, or the coordinates of its vertices. It is copied. The physical surfaces of a file of Gmsh that meshio
+        has read are features by their names; PyVista does not keep the names.
     cells : dict, optional
         With coordinates: the cells, as `Mesh` takes them.
     faces : dict, optional
