@@ -10,9 +10,11 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Optional
@@ -41,6 +43,26 @@ Search = Callable[[Ask, float], float]
 def configuration(*pipelines: Mapping[str, Any]) -> dict[str, Any]:
     """Pipelines with a server on any free port."""
     return {"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": list(pipelines)}
+
+
+@contextlib.contextmanager
+def terminable() -> Iterator[None]:
+    """Within the block SIGTERM raises `SystemExit`, as Ctrl-C raises `KeyboardInterrupt`: what has begun is ended."""
+
+    def end(number: int, _: object) -> None:
+        # One is enough: a second must not break off what the first has begun to end.
+        signal.signal(number, signal.SIG_IGN)
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is not threading.main_thread():
+        # Python lets the main thread alone handle signals.
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextlib.contextmanager
@@ -107,6 +129,7 @@ class Flows(NamedTuple):
         at = {"cycle": 0}
         orders = [{"at": at, "parameter": {"name": name, "value": value}} for name, value in self.parameters.items()]
         with contextlib.ExitStack() as ended:
+            ended.enter_context(terminable())
             folder = Path(ended.enter_context(tempfile.TemporaryDirectory()))
             case = self.shaped(edits, folder)
             link = ended.enter_context(begun(self.program, case, configuration(DROP, SHAPE), orders, folder))

@@ -2,7 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -155,6 +158,33 @@ def test_an_angle_is_found_on_a_running_flow_and_with_restarts(small_case):
         far = [answer for answer in way.answers if abs(answer.value - value) > 4]
         assert far and all(answer.drop > 1.0005 * drop for answer in far)
     assert found.running.mean < 0.9 * found.restarted.mean
+
+
+def test_a_study_that_is_terminated_ends_its_flow(small_nozzle, tmp_path):
+    pytest.importorskip("scipy")
+    if not Path("/proc/self/task").exists():
+        pytest.skip("there is no /proc to find the flow in")
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    command = [sys.executable, EXAMPLES / "study/throat.py", "--flow", FLOW, "--case", small_nozzle]
+    with subprocess.Popen(
+        command, env=os.environ | {"TMPDIR": str(folder)}, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            end = time.monotonic() + 60
+            while not list(folder.glob("*/tombolo-*.link")) and process.poll() is None and time.monotonic() < end:
+                time.sleep(0.05)
+            (flow,) = map(int, Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split())
+            process.send_signal(signal.SIGTERM)
+            _, said = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    is_left = Path(f"/proc/{flow}").exists()
+    if is_left:
+        os.kill(flow, signal.SIGKILL)
+    assert not is_left
+    assert process.returncode == 128 + signal.SIGTERM, said
+    assert not list(folder.iterdir())
 
 
 def test_heat_in_numpy_alone(tmp_path):
