@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tombolo
+from tombolo import background
 
 PROJECT = Path(__file__).parents[3]
 EXAMPLES = PROJECT / "examples"
@@ -153,6 +154,28 @@ def run(solver):
     """A client of the solver that is under way."""
     with tombolo.connect(solver.link) as connected:
         yield connected
+
+
+@pytest.fixture
+def connections(monkeypatch):
+    """The connections in the background: none is known before a test, and none is left behind it."""
+    known = {}
+    monkeypatch.setattr(background, "_CONNECTIONS", known)
+    yield known
+    for connection in known.values():
+        if connection.run is not None:
+            connection.run.close()
+
+
+def wait(found, seconds=60):
+    """What is asked for again and again until it is there."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        answer = found()
+        if answer:
+            return answer
+        time.sleep(0.02)
+    raise TimeoutError("it did not come in time")
 
 
 @pytest.fixture

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from typing import Any, Literal, Optional, Union
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from .errors import MeshError
 
 __all__ = ["Cells", "Field", "Mesh", "Values"]
 
 Cells = Mapping[Union[str, int], ArrayLike]
 """Cells: from types to vertex numbers, a row for each cell; or `connectivity`, `offsets` and `types` of VTK."""
+
+Faces = Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]
+"""Named parts of the boundary: from names to faces `(m, 3)` or `(m, 4)`, or to a dict from types to such arrays."""
 
 Values = Union[ArrayLike, Sequence[NDArray[Any]], "Field"]
 """Values of a field: `(n,)` or `(n, k)`, or one array `(n,)` for each component."""
@@ -104,7 +110,7 @@ class Mesh:
         cells: Optional[Cells] = None,
         fields: Optional[Mapping[str, Values]] = None,
         *,
-        faces: Optional[Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]] = None,
+        faces: Optional[Faces] = None,
         vertex_features: Optional[ArrayLike] = None,
         ghost_cells: Optional[ArrayLike] = None,
         global_vertices: Optional[ArrayLike] = None,
@@ -122,3 +128,36 @@ class Mesh:
     def __repr__(self) -> str:
         fields = ", ".join(self.fields) or "none"
         return f"<tombolo.Mesh with the fields: {fields}>"
+
+
+def faces_of_features(
+    parts: Iterable[tuple[Union[str, int], NDArray[Any], NDArray[Any]]], names: Mapping[int, str]
+) -> Optional[Faces]:
+    """Find the faces of each feature, as `Mesh` takes them.
+
+    Parameters
+    ----------
+    parts : iterable of (type, rows, numbers)
+        Faces of one type, a row each, and the number of each one's feature; a number below 0 is that of none.
+    names : dict
+        From numbers to names; a feature without one is called after its number, as in the program `tombolo`.
+
+    Returns
+    -------
+    dict or None
+        In the order of the numbers; None where no face has a feature.
+    """
+    found: dict[int, dict[Union[str, int], list[NDArray[Any]]]] = {}
+    for kind, rows, numbers in parts:
+        if numbers.ndim != 1 or not np.array_equal(numbers, np.trunc(numbers)):
+            raise MeshError("the cell array 'features': found other values, expected a whole number for each cell")
+        for number in np.unique(numbers[numbers >= 0]):
+            found.setdefault(int(number), {}).setdefault(kind, []).append(rows[numbers == number])
+    named: dict[str, dict[Union[str, int], list[NDArray[Any]]]] = {}
+    for number in sorted(found):
+        # Numbers with one name are one feature.
+        of_name = named.setdefault(names.get(number, f"feature-{number}"), {})
+        for kind, faces in found[number].items():
+            of_name.setdefault(kind, []).extend(faces)
+    joined = {name: {kind: np.concatenate(faces) for kind, faces in kinds.items()} for name, kinds in named.items()}
+    return joined or None

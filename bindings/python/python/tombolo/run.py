@@ -50,7 +50,7 @@ class Event(NamedTuple):
     Attributes
     ----------
     kind : str
-        `hello`, `status`, `order`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
+        `hello`, `status`, `order`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
         `note_removed`, `error`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes
         behind it) or the name of a message that this version does not know.
     data : dict, View or str
@@ -142,6 +142,7 @@ class Run:
         self._changed = threading.Condition()
         self._hello: dict[str, Any] = {}
         self._status: Optional[Status] = None
+        self._stack: dict[str, Any] = {}
         self._end: Optional[dict[str, Any]] = None
         self._failure: Optional[TomboloError] = None
         self._views: dict[str, View] = {}
@@ -196,11 +197,14 @@ class Run:
         if kind == "hello":
             for report in data.pop("orders", []):
                 self._take_order(report)
+            self._stack = data.get("stack", self._stack)
             self._hello = data
         elif kind == "status":
             self._status = Status._of(data)
         elif kind == "order":
             self._take_order(data)
+        elif kind == "stack":
+            self._stack = data
         elif kind == "monitor":
             self.monitors._table(data["pipeline"])._append(data)
         elif kind == "end":
@@ -294,6 +298,11 @@ class Run:
         """The edits that make the present shape, the oldest first, as the run answers now."""
         edits: list[dict[str, Any]] = _json.loads(self._client.stack())
         return edits
+
+    @property
+    def edit_count(self) -> int:
+        """How many edits make the present shape, as it was last told: without a wait, unlike `stack`."""
+        return int(self._stack.get("edits", 0))
 
     @property
     def orders(self) -> list[Order]:

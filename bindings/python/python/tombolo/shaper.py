@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
-from .mesh import Cells, Mesh
+from .mesh import Cells, Faces, Mesh, faces_of_features
 from .orders import Forecast
 from .views import Surface
 
@@ -84,49 +84,37 @@ _DIMENSIONS = {
 
 
 def _of_meshio(mesh: Any) -> Mesh:
-    is_gmsh = "gmsh:physical" in mesh.cell_data
-    groups = mesh.cell_data["gmsh:physical"] if is_gmsh else [np.zeros(len(block.data), int) for block in mesh.cells]
+    # What meshio calls the numbers of Gmsh's groups, and what the program calls those of features in a file of VTK.
+    key = next((key for key in ("gmsh:physical", "features") if key in mesh.cell_data), None)
+    groups = mesh.cell_data[key] if key else [np.full(len(block.data), -1) for block in mesh.cells]
     blocks: dict[str, list[tuple[NDArray[Any], NDArray[Any]]]] = {}
     for block, numbers in zip(mesh.cells, groups):
         blocks.setdefault(block.type, []).append((block.data, numbers))
     parts: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
     for kind, of_kind in blocks.items():
         rows, numbers = (np.concatenate(arrays) for arrays in zip(*of_kind))
-        if is_gmsh:
+        if key == "gmsh:physical":
             # Version 2.2 has a cell of several groups once for each: the first holds.
             first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-            rows, numbers = rows[first], numbers[first]
+            # 0 is that of no group; one below 0 says that a surface is turned round in its group.
+            rows, numbers = rows[first], np.where(numbers == 0, -1, np.abs(numbers))[first]
         parts[kind] = rows, numbers
     # Faces and edges beside volume cells are of the boundary. A type that is not known is kept, and refused by name.
     most = max((_DIMENSIONS.get(kind, 0) for kind in parts), default=0)
     cells: dict[Union[str, int], ArrayLike] = {
         kind: rows for kind, (rows, _) in parts.items() if _DIMENSIONS.get(kind, most) == most
     }
-    return Mesh(mesh.points, cells, faces=_physical_surfaces(mesh.field_data, parts))
-
-
-def _physical_surfaces(
-    named: Mapping[str, Any], parts: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]
-) -> Optional[dict[str, dict[Union[str, int], ArrayLike]]]:
-    """The surfaces of Gmsh's groups, as the program takes them from the file: in the order of their numbers."""
-    found: dict[int, dict[Union[str, int], ArrayLike]] = {}
-    for kind, (rows, numbers) in parts.items():
-        if _DIMENSIONS.get(kind) == 2:
-            # 0 is that of no group; one below 0 says that a surface is turned round in its group.
-            for number in np.unique(np.abs(numbers[numbers != 0])):
-                found.setdefault(int(number), {})[kind] = rows[np.abs(numbers) == number]
-    if not found:
-        return None
-    names = {int(number): name for name, (number, dimension) in named.items() if dimension == 2}
-    return {names.get(number, f"feature-{number}"): found[number] for number in sorted(found)}
-
-
-def _of_pyvista(mesh: Any) -> Mesh:
-    grid = mesh if hasattr(mesh, "celltypes") else mesh.cast_to_unstructured_grid()
-    # Its older name was given up.
-    offsets = grid.cell_offsets if hasattr(type(grid), "cell_offsets") else grid.offset
-    cells: Cells = {"connectivity": grid.cell_connectivity, "offsets": offsets, "types": grid.celltypes}
-    return Mesh(grid.points, cells)
+    pairs = {name: np.ravel(pair) for name, pair in mesh.field_data.items()}
+    names = {int(pair[0]): name for name, pair in pairs.items() if len(pair) == 2 and pair[1] == 2}
+    faces = faces_of_features(
+        ((kind, rows, numbers) for kind, (rows, numbers) in parts.items() if _DIMENSIONS.get(kind) == 2), names
+    )
+    return Mesh(
+        mesh.points,
+        cells,
+        faces=faces,
+        vertex_features=mesh.point_data.get("features") if faces is None else None,
+    )
 
 
 class Shaper:
@@ -137,9 +125,10 @@ class Shaper:
 
     Parameters
     ----------
-    mesh : Mesh, meshio.Mesh, pyvista mesh, or array of shape (n, 2) or (n, 3)
-        The mesh, or the coordinates of its vertices. It is copied. The physical surfaces of a file of Gmsh that meshio
-        has read are features by their names; PyVista does not keep the names.
+    mesh : Mesh, meshio.Mesh, pyvista mesh, vtkDataSet, or array of shape (n, 2) or (n, 3)
+        The mesh, or the coordinates of its vertices. It is copied. Features are those that the program finds in the
+        file that it was read from: Gmsh's physical surfaces by name, where meshio has read them (PyVista does not keep
+        the names), and the array `features` of VTK.
     cells : dict, optional
         With coordinates: the cells, as `Mesh` takes them.
     faces : dict, optional
@@ -169,7 +158,7 @@ class Shaper:
         self,
         mesh: Any,
         cells: Optional[Cells] = None,
-        faces: Optional[Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]] = None,
+        faces: Optional[Faces] = None,
         *,
         angle: Optional[float] = None,
     ) -> None:
@@ -178,8 +167,10 @@ class Shaper:
         elif not isinstance(mesh, (Mesh, Mapping)):
             if hasattr(mesh, "cells_dict") and hasattr(mesh, "point_sets"):
                 mesh = _of_meshio(mesh)
-            elif hasattr(mesh, "celltypes") or hasattr(mesh, "cast_to_unstructured_grid"):
-                mesh = _of_pyvista(mesh)
+            elif hasattr(mesh, "GetCellData"):
+                from . import vtk
+
+                mesh = vtk.to_mesh(mesh)
         self._shaper = _native.Shaper(mesh, angle)
 
     # ---- What the mesh is.

@@ -55,23 +55,9 @@ class View(NamedTuple):
         """The view as a `pyvista.PolyData`, lines before triangles as VTK keeps them; needs PyVista."""
         import pyvista
 
-        def padded(cells: NDArray[np.uint32]) -> NDArray[np.int64]:
-            sizes = np.full((len(cells), 1), cells.shape[1], np.int64)
-            return np.hstack([sizes, cells.astype(np.int64)]).ravel()
+        from . import vtk
 
-        poly = pyvista.PolyData()
-        poly.points = self.points
-        if len(self.lines):
-            poly.lines = padded(self.lines)
-        if len(self.triangles):
-            poly.faces = padded(self.triangles)
-        for name, values in _of(self.fields, self.associations, "vertex").items():
-            poly.point_data[name] = values
-        for name, values in _of(self.fields, self.associations, "element").items():
-            poly.cell_data[name] = np.concatenate([values[len(self.triangles) :], values[: len(self.triangles)]])
-        if self.features is not None and not len(self.lines):
-            poly.cell_data["features"] = self.features
-        return poly
+        return pyvista.wrap(vtk.of_view(self))
 
     def to_meshio(self) -> Any:
         """The view as a `meshio.Mesh`; needs meshio."""
@@ -133,12 +119,9 @@ class Surface(NamedTuple):
         """The surface as a `pyvista.PolyData` with the cell array `features`; needs PyVista."""
         import pyvista
 
-        sizes = np.diff(self.offsets)
-        faces = np.insert(self.connectivity.astype(np.int64), self.offsets[:-1], sizes)
-        poly = pyvista.PolyData(self.points, faces)
-        poly.cell_data["features"] = self.features
-        poly.point_data["vertices"] = self.vertices
-        return poly
+        from . import vtk
+
+        return pyvista.wrap(vtk.of_surface(self))
 
     def __repr__(self) -> str:
         return f"<tombolo.Surface: {len(self.points)} points, features: {', '.join(self.names)}>"

@@ -1,0 +1,153 @@
+"""Runs that are connected and steered in the background: for programs whose interface must not wait for a network."""
+
+from __future__ import annotations
+
+import threading
+import time as clock
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Optional
+
+from .errors import TomboloError
+from .orders import Order
+from .run import Run, connect
+from .views import Surface
+
+if TYPE_CHECKING:
+    from .run import Edits
+
+__all__ = ["Connection", "Requests", "connection"]
+
+#: Seconds until a run that was not reached is tried again.
+_AGAIN = 5.0
+
+_CONNECTIONS: dict[str, Connection] = {}
+_LOCK = threading.Lock()
+
+
+class Connection:
+    """A run that a thread of its own connects to. What is not there yet is None.
+
+    Attributes
+    ----------
+    link : str
+        The link, or the file that holds it.
+    run : Run or None
+        The run.
+    surface : Surface or None
+        Its reference surface: there is none before its first step.
+    failure : str or None
+        Why there is no run, or no surface.
+    """
+
+    def __init__(self, link: str) -> None:
+        self.link = link
+        self.run: Optional[Run] = None
+        self.surface: Optional[Surface] = None
+        self.failure: Optional[str] = None
+        self._again = 0.0
+        self._thread: Optional[threading.Thread] = None
+        self._ask()
+
+    def _ask(self) -> None:
+        """Try, unless it is being tried, has come or has failed just now."""
+        is_trying = self._thread is not None and self._thread.is_alive()
+        if self.run is None and not is_trying and clock.monotonic() >= self._again:
+            self._thread = threading.Thread(target=self._connect, name="tombolo-connection", daemon=True)
+            self._thread.start()
+
+    def _connect(self) -> None:
+        try:
+            run = connect(self.link)
+            self.run, self.failure = run, None
+            # Before the first step there is no mesh.
+            run.wait_for(lambda: run.features, None)
+            self.surface = run.surface
+        except TomboloError as error:
+            self.failure, self._again = str(error), clock.monotonic() + _AGAIN
+
+    def __repr__(self) -> str:
+        # The link has a secret in it.
+        return f"<tombolo.background.Connection to {self.run if self.run is not None else self.failure or 'a run'}>"
+
+
+def connection(link: str) -> Optional[Connection]:
+    """Find the connection of a link, which all who ask for it share; it never waits.
+
+    A connection is begun when it is first asked for. Where the run is not reached, it is tried again later, when it is
+    asked for once more.
+
+    Parameters
+    ----------
+    link : str
+        As `connect` takes it; nothing comes of an empty one.
+
+    Returns
+    -------
+    Connection or None
+        The connection, which may have no run yet; None for an empty link.
+    """
+    link = link.strip()
+    if not link:
+        return None
+    with _LOCK:
+        known = _CONNECTIONS.get(link)
+        if known is None:
+            known = _CONNECTIONS[link] = Connection(link)
+        known._ask()
+        return known
+
+
+class Requests:
+    """Forecasts, orders and undos, each asked for by a thread of its own, and what has become of the last."""
+
+    def __init__(self) -> None:
+        self._answers: dict[str, str] = {}
+        self._order: Optional[Order] = None
+
+    def forecast(self, run: Run, edits: Edits, **settings: Any) -> None:
+        """Ask what an order would come to. Parameters as of `Run.forecast`."""
+
+        def ask() -> str:
+            forecast = run.forecast(edits, **settings)
+            reason = "" if forecast.reason is None else f", {forecast.reason}"
+            return f"{forecast.outcome}, least scaled Jacobian {forecast.min_scaled_jacobian}{reason}"
+
+        self._begin("forecast", ask)
+
+    def order(self, run: Run, edits: Edits, **settings: Any) -> None:
+        """Give an order. Parameters as of `Run.order`."""
+        self._begin("order", lambda: self._follow(run.order(edits, **settings)))
+
+    def undo(self, run: Run) -> None:
+        """Take the last order back."""
+        self._begin("undo", lambda: self._follow(run.undo()))
+
+    def _follow(self, order: Order) -> str:
+        self._order = order
+        return f"given as {order.id}"
+
+    def _begin(self, title: str, ask: Callable[[], str]) -> None:
+        self._answers[title] = "asked"
+
+        def work() -> None:
+            try:
+                self._answers[title] = ask()
+            except TomboloError as error:
+                self._answers[title] = f"refused: {error}"
+
+        threading.Thread(target=work, name=f"tombolo-{title}", daemon=True).start()
+
+    @property
+    def outcomes(self) -> dict[str, str]:
+        """What has become of them, to be shown to a person.
+
+        The answers to the last `forecast`, `order` and `undo`; of the last order or undo the `status`, and the `reason`
+        where there is one.
+        """
+        outcomes, order = dict(self._answers), self._order
+        if order is not None:
+            shape, shapes = order.shape
+            outcomes["status"] = f"{order.status}, shape {shape} of {shapes}"
+            if order.reason:
+                outcomes["reason"] = order.reason
+        return outcomes

@@ -1,0 +1,60 @@
+"""Runs that are connected and steered in the background, as a program with an interface does it."""
+
+import time
+
+import pytest
+import tombolo
+from conftest import SQUEEZE, wait
+from tombolo import background
+from tombolo.background import Requests, connection
+
+pytestmark = pytest.mark.usefixtures("connections")
+
+
+def test_a_connection_is_shared_and_nobody_waits_for_it(solver):
+    begun = time.monotonic()
+    known = connection(solver.link)
+    assert time.monotonic() - begun < 1
+    assert connection(f" {solver.link}\n") is known
+    assert connection("") is None
+    surface = wait(lambda: known.surface)
+    assert known.failure is None and known.run.features
+    assert surface.names == ["top", "bottom", "untagged"]
+    assert "token" not in repr(known)
+
+
+def test_why_there_is_no_run_is_told_and_it_is_tried_again(solver, tmp_path, monkeypatch):
+    file = tmp_path / "run.link"
+    file.write_text("nothing")
+    known = connection(str(file))
+    assert "expected http://" in wait(lambda: known.failure)
+    file.write_text(solver.link)
+    assert connection(str(file)) is known
+    # Not at once.
+    assert known.run is None and known.failure is not None
+    monkeypatch.setattr(background.clock, "monotonic", lambda now=time.monotonic: now() + 10)
+    assert connection(str(file)) is known
+    assert wait(lambda: known.run).status.cycle >= 0
+    assert known.failure is None
+
+
+def test_orders_are_forecast_given_and_taken_back(solver):
+    known, requests = connection(solver.link), Requests()
+    run = wait(lambda: known.run)
+    assert requests.outcomes == {}
+    requests.forecast(run, SQUEEZE)
+    told = wait(lambda: requests.outcomes["forecast"].partition("asked")[0])
+    assert told.startswith("applied, least scaled Jacobian 0.")
+    assert run.edit_count == 0
+    requests.order(run, SQUEEZE, schedule={"steps": 2})
+    wait(lambda: requests.outcomes.get("status") == "applied, shape 2 of 2")
+    wait(lambda: run.edit_count == 1)
+    assert run.edit_count == len(run.stack)
+    requests.undo(run)
+    wait(lambda: run.edit_count == 0 and requests.outcomes["status"].startswith("applied"))
+    requests.order(run, [{"translate": {"features": ["tpo"], "by": [0, 0, 1]}}])
+    wait(lambda: "tpo" in "".join(requests.outcomes.values()))
+    watching = tombolo.connect(solver.link, watch=True)
+    requests.undo(watching)
+    wait(lambda: requests.outcomes["undo"].startswith("refused: this client only watches"))
+    watching.close()
