@@ -11,15 +11,15 @@ the array `displacement`, which the same kernel computes that moves the solver's
 """
 
 import json
-import threading
 import time
 
 import numpy as np
 import tombolo
 from paraview.util.vtkAlgorithm import VTKPythonAlgorithmBase, smhint, smproperty, smproxy
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from tombolo import vtk
+from tombolo.background import Requests, connection
 from vtkmodules.vtkCommonCore import vtkStringArray
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData, vtkTable
+from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkTable
 
 # ---- Properties, as ParaView's XML has them.
 
@@ -86,40 +86,7 @@ def _names(text):
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
-# ---- Runs: connected by threads, so that nothing here waits for a network.
-
-
-class _Connection:
-    """A run, once it is connected; before that, or where it cannot be, None and the reason."""
-
-    def __init__(self, link):
-        self.link, self.run, self.surface, self.trouble = link, None, None, "connecting"
-        threading.Thread(target=self._connect, name="tombolo-paraview", daemon=True).start()
-
-    def _connect(self):
-        try:
-            run = tombolo.connect(self.link)
-            self.run, self.trouble = run, ""
-            # Before the first step there is no mesh.
-            run.wait_for(lambda: run.features, None)
-            self.surface = run.surface
-        except tombolo.TomboloError as error:
-            self.trouble = str(error)
-
-
-_connections: dict = {}
-
-
-def connection(link):
-    """The connection of a link; it is made when it is first asked for, and again where it was lost."""
-    link = link.strip()
-    if not link:
-        return None
-    known = _connections.get(link)
-    ended = known is not None and known.run is None and known.trouble != "connecting"
-    if known is None or ended:
-        known = _connections[link] = _Connection(link)
-    return known
+# ---- What all of them have.
 
 
 def _breathe():
@@ -127,131 +94,43 @@ def _breathe():
     time.sleep(0.002)
 
 
-# ---- Data of VTK.
-
-
-def _field_text(data, name, values=None):
-    """A list of texts beside the data, or None; with values it is set."""
-    if values is None:
-        array = data.GetFieldData().GetAbstractArray(name)
-        return None if array is None else [array.GetValue(index) for index in range(array.GetNumberOfValues())]
-    array = vtkStringArray()
-    array.SetName(name)
-    for value in values:
-        array.InsertNextValue(value)
-    data.GetFieldData().AddArray(array)
-    return values
-
-
-def _add(attributes, name, values):
-    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
-    array.SetName(name)
-    attributes.AddArray(array)
-
-
-def _cells(connectivity, offsets):
-    cells = vtkCellArray()
-    cells.SetData(
-        numpy_to_vtk(np.ascontiguousarray(offsets, np.int64), deep=True),
-        numpy_to_vtk(np.ascontiguousarray(connectivity, np.int64).ravel(), deep=True),
-    )
-    return cells
-
-
-def _rows(cells):
-    return _cells(cells, np.arange(len(cells) + 1) * cells.shape[1])
-
-
-def _set_points(output, points):
-    from vtkmodules.vtkCommonCore import vtkPoints
-
-    held = vtkPoints()
-    held.SetData(numpy_to_vtk(np.ascontiguousarray(points, np.float64), deep=True))
-    output.SetPoints(held)
-
-
-def _poly(view, output):
-    """A view as polygons: lines before triangles, as VTK keeps them."""
-    _set_points(output, view.points)
-    if len(view.lines):
-        output.SetLines(_rows(view.lines))
-    if len(view.triangles):
-        output.SetPolys(_rows(view.triangles))
-    triangles = len(view.triangles)
-    for name, values in view.fields.items():
-        if view.associations[name] == "vertex":
-            _add(output.GetPointData(), name, values)
-        else:
-            _add(output.GetCellData(), name, np.concatenate([values[triangles:], values[:triangles]]))
-    if view.features is not None and not len(view.lines):
-        _add(output.GetCellData(), "features", view.features.astype(np.int32))
-    _add(output.GetFieldData(), "cycle", np.array([view.cycle], np.int64))
-    _add(output.GetFieldData(), "TimeValue", np.array([view.time]))
-
-
-def _points(data):
-    return vtk_to_numpy(data.GetPoints().GetData()).astype(np.float64)
-
-
-def _faces(data):
-    """Faces of polygons: the vertices of each one after the other, where each begins, and the feature of each."""
-    polys = data.GetPolys()
-    features = data.GetCellData().GetArray("features")
-    if features is None:
-        raise tombolo.MeshError("the input: found no cell array 'features', expected that of a Tombolo surface")
-    return (
-        vtk_to_numpy(polys.GetConnectivityArray()),
-        vtk_to_numpy(polys.GetOffsetsArray()),
-        vtk_to_numpy(features)[-polys.GetNumberOfCells() :],
-    )
-
-
-def _shaper(data, angle=None):
-    """What gives the surface other shapes: made once for each surface."""
-    points, names = _points(data), _field_text(data, "feature_names") or []
-    connectivity, offsets, features = (
-        _faces(data)
-        if angle is None
-        else (
-            vtk_to_numpy(data.GetPolys().GetConnectivityArray()),
-            vtk_to_numpy(data.GetPolys().GetOffsetsArray()),
-            None,
+def _displacement(data, name):
+    moved = vtk.array(data.GetPointData(), name)
+    if moved is None or moved.shape[1:] != (3,):
+        raise tombolo.MeshError(
+            f"the input: found no point array '{name}' of three components, expected a displacement"
         )
-    )
-    key = (
-        points.tobytes(),
-        connectivity.tobytes(),
-        tuple(names),
-        None if features is None else features.tobytes(),
-        angle,
-    )
-    if key not in _shapers:
-        sizes = np.diff(offsets)
-        kinds = {"triangle": 3, "quad": 4}
-
-        def chosen(which):
-            found = {kind: np.flatnonzero(which & (sizes == size)) for kind, size in kinds.items()}
-            return {
-                kind: connectivity[offsets[rows][:, None] + np.arange(kinds[kind])]
-                for kind, rows in found.items()
-                if len(rows)
-            }
-
-        every = np.ones(len(sizes), bool)
-        faces = None if features is None else {name: chosen(features == index) for index, name in enumerate(names)}
-        if faces is not None:
-            faces = {name: parts for name, parts in faces.items() if parts}
-        while len(_shapers) >= 4:
-            _shapers.pop(next(iter(_shapers)))
-        _shapers[key] = tombolo.Shaper(points, chosen(every), faces, angle=angle)
-    return _shapers[key]
+    return moved.astype(np.float64)
 
 
-_shapers: dict = {}
+def _vertices(data):
+    vertices = vtk.array(data.GetPointData(), "vertices")
+    if vertices is None:
+        raise tombolo.MeshError("the input: found no point array 'vertices', expected that of a Tombolo surface")
+    return vertices
+
+
+def _edits(data):
+    """The edits that come with the input."""
+    return json.loads((vtk.texts(data, "edits") or ["[]"])[0])
+
+
+def _setter(name):
+    """What ParaView calls with the values of a property: several of them are a tuple."""
+
+    def put(self, *values):
+        value = values if len(values) > 1 else values[0]
+        # ParaView has None for an empty text.
+        value = "" if value is None else value
+        if getattr(self, name) != value:
+            setattr(self, name, value)
+            self.Modified()
+
+    return put
 
 
 class _Algorithm(VTKPythonAlgorithmBase):
-    """What all of them have: values of properties, and errors that are told once, where ParaView tells them."""
+    """A source or filter. What is wrong is told once, where ParaView tells it."""
 
     inputs = 1
     output = "vtkPolyData"
@@ -263,13 +142,6 @@ class _Algorithm(VTKPythonAlgorithmBase):
     def FillInputPortInformation(self, port, info):
         info.Set(self.INPUT_REQUIRED_DATA_TYPE(), "vtkPolyData")
         return 1
-
-    def _set(self, name, value):
-        # ParaView has None for an empty text.
-        value = "" if value is None else value
-        if getattr(self, name) != value:
-            setattr(self, name, value)
-            self.Modified()
 
     def RequestData(self, request, inputs, outputs):
         kind = vtkTable if self.output == "vtkTable" else vtkPolyData
@@ -290,8 +162,55 @@ class _Algorithm(VTKPythonAlgorithmBase):
             self._told = text
             print_error(f"Tombolo: {text}")
 
+    def Refresh(self):
+        _breathe()
+        self.Modified()
+
 
 # ---- Sources.
+
+
+class _Source(_Algorithm):
+    """What shows the newest of a run, and never waits for it."""
+
+    inputs = 0
+    link = ""
+    _shown = None
+
+    SetLink = _setter("link")
+
+    def found(self, connected):
+        """What there is to show, or a text of why there can be nothing; None where it has not come yet."""
+        raise NotImplementedError
+
+    def convert(self, found):
+        """The same for VTK."""
+        raise NotImplementedError
+
+    def newest(self):
+        """What there is to show, or a text of why there is nothing."""
+        connected = connection(self.link)
+        if connected is None:
+            return None
+        found = self.found(connected)
+        return connected.failure if found is None else found
+
+    def GetNeedsUpdate(self):
+        """Whether there is anything new; ParaView's interface asks."""
+        _breathe()
+        newest = self.newest()
+        is_told = isinstance(newest, str) and newest == self._shown
+        needed = newest is not None and newest is not self._shown and not is_told
+        if needed:
+            self.Modified()
+        return needed
+
+    def run(self, output):
+        self._shown = newest = self.newest()
+        if isinstance(newest, str):
+            raise tombolo.TomboloError(newest)
+        if newest is not None:
+            output.ShallowCopy(self.convert(newest))
 
 
 @smproxy.source(name="TomboloRun", label="Tombolo Run", support_reload=False)
@@ -301,94 +220,37 @@ class _Algorithm(VTKPythonAlgorithmBase):
     + _text("View", "The name of a live view of the run; empty: its first.")
     + _button("Refresh", "Takes the newest frame. The interface does so by itself, ten times a second.")
 )
-class TomboloRun(_Algorithm):
-    """A live view of a run: the newest frame that has come. It never waits for one."""
+class TomboloRun(_Source):
+    """A live view of a run: the newest frame that has come."""
 
-    inputs = 0
-    link = view = ""
-    _shown = None
+    view = ""
+    convert = staticmethod(vtk.of_view)
 
-    def SetLink(self, link):
-        self._set("link", link)
+    SetView = _setter("view")
 
-    def SetView(self, view):
-        self._set("view", view)
-
-    def _frame(self):
-        connected = connection(self.link)
-        if connected is None or connected.run is None:
-            return None
+    def found(self, connected):
         run = connected.run
-        name = self.view or next(iter(run.view_names), "")
-        return run.views.get(name)
-
-    def GetNeedsUpdate(self):
-        """Whether there is a newer frame; ParaView's interface asks."""
-        _breathe()
-        frame = self._frame()
-        needed = frame is not None and frame is not self._shown
-        if needed:
-            self.Modified()
-        return needed
-
-    def Refresh(self):
-        _breathe()
-        self.Modified()
-
-    def run(self, output):
-        frame = self._frame()
-        if frame is not None:
-            _poly(frame, output)
-            self._shown = frame
-            return
-        connected = connection(self.link)
-        if connected is not None and connected.run is None and connected.trouble != "connecting":
-            raise tombolo.LinkError(connected.trouble)
-        if connected is not None and connected.run is not None and self.view:
-            known = connected.run.view_names
-            if known and self.view not in known:
-                raise tombolo.ConfigurationError(f"no view '{self.view}'; there are: {', '.join(known)}")
+        if run is None:
+            return None
+        names = run.view_names
+        if self.view and names and self.view not in names:
+            return f"no view '{self.view}'; there are: {', '.join(names)}"
+        return run.views.get(self.view or next(iter(names), ""))
 
 
 @smproxy.source(name="TomboloSurface", label="Tombolo Surface", support_reload=False)
 @smhint.xml('<LiveSource interval="500"/>')
 @smproperty.xml(_LINK + _button("Refresh", "Asks for it again, where the run has only begun."))
-class TomboloSurface(_Algorithm):
+class TomboloSurface(_Source):
     """The reference surface of a run with its features: what edits are measured from."""
 
-    inputs = 0
-    link = ""
-    _shown = None
+    def found(self, connected):
+        return connected.surface
 
-    def SetLink(self, link):
-        self._set("link", link)
-
-    def GetNeedsUpdate(self):
-        """Whether it has come."""
-        _breathe()
-        connected = connection(self.link)
-        needed = connected is not None and connected.surface is not None and connected.surface is not self._shown
-        if needed:
-            self.Modified()
-        return needed
-
-    def Refresh(self):
-        _breathe()
-        self.Modified()
-
-    def run(self, output):
-        connected = connection(self.link)
-        if connected is None or connected.surface is None:
-            if connected is not None and connected.run is None and connected.trouble != "connecting":
-                raise tombolo.LinkError(connected.trouble)
-            return
-        self._shown = surface = connected.surface
-        _set_points(output, surface.points)
-        output.SetPolys(_cells(surface.connectivity, surface.offsets))
-        _add(output.GetPointData(), "vertices", surface.vertices.astype(np.int64))
-        _add(output.GetCellData(), "features", surface.features.astype(np.int32))
-        _field_text(output, "feature_names", surface.names)
-        _field_text(output, "edits", ["[]"])
+    def convert(self, found):
+        made = vtk.of_surface(found)
+        vtk.set_texts(made, "edits", ["[]"])
+        return made
 
 
 # ---- Features and edits.
@@ -404,16 +266,15 @@ class TomboloFeaturesByAngle(_Algorithm):
 
     angle = 30.0
 
-    def SetAngle(self, angle):
-        self._set("angle", angle)
+    SetAngle = _setter("angle")
 
     def run(self, output, surface):
         output.ShallowCopy(surface)
-        found = _shaper(surface, self.angle).surface
-        _add(output.GetCellData(), "features", found.features.astype(np.int32))
-        _field_text(output, "feature_names", found.names)
-        _field_text(output, "edits", ["[]"])
-        _field_text(output, "own_features", ["by angle"])
+        found = vtk.shaper(surface, angle=self.angle).surface
+        vtk.add(output.GetCellData(), "features", found.features.astype(np.int32))
+        vtk.set_texts(output, "feature_names", found.names)
+        vtk.set_texts(output, "edits", ["[]"])
+        vtk.set_texts(output, "own_features", ["by angle"])
 
 
 class _Edit(_Algorithm):
@@ -422,14 +283,9 @@ class _Edit(_Algorithm):
     features = fixed = ""
     order = 2
 
-    def SetFeatures(self, names):
-        self._set("features", names)
-
-    def SetFixed(self, names):
-        self._set("fixed", names)
-
-    def SetHarmonicOrder(self, order):
-        self._set("order", order)
+    SetFeatures = _setter("features")
+    SetFixed = _setter("fixed")
+    SetHarmonicOrder = _setter("order")
 
     def edit(self):
         """The edit in JSON's terms."""
@@ -441,10 +297,9 @@ class _Edit(_Algorithm):
 
     def run(self, output, surface):
         output.ShallowCopy(surface)
-        edits = [*json.loads((_field_text(surface, "edits") or ["[]"])[0]), self.edit()]
-        moved = _shaper(surface).displacement(edits)
-        _add(output.GetPointData(), "displacement", moved)
-        _field_text(output, "edits", [json.dumps(edits)])
+        edits = [*_edits(surface), self.edit()]
+        vtk.add(output.GetPointData(), "displacement", vtk.shaper(surface).displacement(edits))
+        vtk.set_texts(output, "edits", [json.dumps(edits)])
 
 
 @smproxy.filter(name="TomboloTranslate", label="Tombolo Translate", support_reload=False)
@@ -454,8 +309,7 @@ class TomboloTranslate(_Edit):
 
     by = (0.0, 0.0, 0.0)
 
-    def SetBy(self, x, y, z):
-        self._set("by", (x, y, z))
+    SetBy = _setter("by")
 
     def edit(self):
         return {"translate": {**self.handle(), "by": list(self.by)}}
@@ -468,8 +322,7 @@ class TomboloScaleDirection(_Edit):
 
     factors = (1.0, 1.0, 1.0)
 
-    def SetFactors(self, x, y, z):
-        self._set("factors", (x, y, z))
+    SetFactors = _setter("factors")
 
     def edit(self):
         return {"scale_direction": {**self.handle(), "factors": list(self.factors)}}
@@ -482,8 +335,7 @@ class TomboloScaleNormals(_Edit):
 
     distance = 0.0
 
-    def SetDistance(self, distance):
-        self._set("distance", distance)
+    SetDistance = _setter("distance")
 
     def edit(self):
         return {"scale_normals": {**self.handle(), "distance": self.distance}}
@@ -500,11 +352,8 @@ class TomboloRotate(_Edit):
 
     axis, degrees = (0.0, 0.0, 1.0), 0.0
 
-    def SetAxis(self, x, y, z):
-        self._set("axis", (x, y, z))
-
-    def SetDegrees(self, degrees):
-        self._set("degrees", degrees)
+    SetAxis = _setter("axis")
+    SetDegrees = _setter("degrees")
 
     def edit(self):
         return {"rotate": {**self.handle(), "axis": list(self.axis), "degrees": self.degrees}}
@@ -516,12 +365,7 @@ class TomboloSkeleton(_Algorithm):
     """The curve skeleton of a surface, with the radius at each node."""
 
     def run(self, output, surface):
-        skeleton = _shaper(surface).skeleton()
-        _set_points(output, skeleton.nodes)
-        if skeleton.curves:
-            offsets = np.concatenate([[0], np.cumsum([len(curve) for curve in skeleton.curves])])
-            output.SetLines(_cells(np.concatenate(skeleton.curves), offsets))
-        _add(output.GetPointData(), "radius", skeleton.radii)
+        output.ShallowCopy(vtk.of_skeleton(vtk.shaper(surface).skeleton()))
 
 
 @smproxy.filter(name="TomboloDragSkeleton", label="Tombolo Drag Skeleton", support_reload=False)
@@ -537,11 +381,8 @@ class TomboloDragSkeleton(_Edit):
 
     at = to = (0.0, 0.0, 0.0)
 
-    def SetAt(self, x, y, z):
-        self._set("at", (x, y, z))
-
-    def SetTo(self, x, y, z):
-        self._set("to", (x, y, z))
+    SetAt = _setter("at")
+    SetTo = _setter("to")
 
     def edit(self):
         by = [end - begin for begin, end in zip(self.at, self.to)]
@@ -557,8 +398,7 @@ class TomboloCombine(_Algorithm):
     inputs = 2
     weights = (1.0, 1.0)
 
-    def SetWeights(self, first, second):
-        self._set("weights", (first, second))
+    SetWeights = _setter("weights")
 
     def run(self, output, first, second):
         moved = [_displacement(each, "displacement") for each in (first, second)]
@@ -567,25 +407,10 @@ class TomboloCombine(_Algorithm):
                 f"the inputs: found {len(moved[0])} and {len(moved[1])} points, expected edits of one surface"
             )
         output.ShallowCopy(first)
-        _add(output.GetPointData(), "displacement", self.weights[0] * moved[0] + self.weights[1] * moved[1])
+        sum_of_both = self.weights[0] * moved[0] + self.weights[1] * moved[1]
+        vtk.add(output.GetPointData(), "displacement", sum_of_both)
         # It is a sum, which no list of edits is.
         output.GetFieldData().RemoveArray("edits")
-
-
-def _displacement(data, name):
-    array = data.GetPointData().GetArray(name)
-    if array is None or array.GetNumberOfComponents() != 3:
-        raise tombolo.MeshError(
-            f"the input: found no point array '{name}' of three components, expected a displacement"
-        )
-    return vtk_to_numpy(array).astype(np.float64)
-
-
-def _vertices(data):
-    array = data.GetPointData().GetArray("vertices")
-    if array is None:
-        raise tombolo.MeshError("the input: found no point array 'vertices', expected that of a Tombolo surface")
-    return vtk_to_numpy(array)
 
 
 @smproxy.filter(name="TomboloExport", label="Tombolo Export Displacement", support_reload=False)
@@ -599,8 +424,7 @@ class TomboloExport(_Algorithm):
 
     file = ""
 
-    def SetFileName(self, file):
-        self._set("file", file)
+    SetFileName = _setter("file")
 
     def run(self, output, surface):
         output.ShallowCopy(surface)
@@ -645,99 +469,59 @@ class TomboloOrder(_Algorithm):
 
     def __init__(self):
         super().__init__()
-        self._rows, self._shown, self._given = {}, None, None
+        self._requests, self._shown = Requests(), None
 
-    def SetLink(self, link):
-        self._set("link", link)
-
-    def SetArray(self, array):
-        self._set("array", array)
-
-    def SetSteps(self, steps):
-        self._set("steps", steps)
-
-    def SetEvery(self, every):
-        self._set("every", every)
+    SetLink = _setter("link")
+    SetArray = _setter("array")
+    SetSteps = _setter("steps")
+    SetEvery = _setter("every")
 
     def edits(self, connected):
         """The edits of the input, or the displacement that it holds."""
         data = self.GetInputDataObject(0, 0)
-        edits = _field_text(data, "edits")
-        own = _field_text(data, "own_features")
-        if self.array == "displacement" and edits and json.loads(edits[0]) and not own:
-            return json.loads(edits[0])
+        edits = _edits(data)
+        if self.array == "displacement" and edits and not vtk.texts(data, "own_features"):
+            return edits
         vertices = _vertices(data)
         if self.array:
             moved = _displacement(data, self.array)
         else:
             surface = connected.surface
-            moved = _points(data) - surface.points[np.searchsorted(surface.vertices, vertices)]
+            if surface is None:
+                raise tombolo.MeshError("the run: found no surface yet, expected that which points were moved from")
+            moved = vtk.points(data) - surface.points[np.searchsorted(surface.vertices, vertices)]
         kept = np.flatnonzero(np.any(moved != 0, axis=1))
         return [{"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}]
 
-    def _work(self, title, work):
-        """Does it on a thread of its own: a forecast may take seconds."""
-        connected = connection(self.link)
-        if connected is None or connected.run is None:
-            self.tell("no run is connected" if connected is None else connected.trouble)
-            return
+    def _ask(self, request):
+        """Asks for something, and tells what is wrong each time."""
         self.GetInputAlgorithm(0, 0).Update()
+        self._told = None
+        connected = connection(self.link)
         try:
-            task = work(connected)
+            if connected is None or connected.run is None:
+                reason = None if connected is None else connected.failure
+                raise tombolo.LinkError(reason or "no run is connected yet")
+            request(connected)
         except tombolo.TomboloError as error:
             self.tell(str(error))
-            return
-        self._rows[title] = "asked"
-
-        def call():
-            try:
-                self._rows[title] = task()
-            except tombolo.TomboloError as error:
-                self._rows[title] = f"refused: {error}"
-
-        threading.Thread(target=call, name="tombolo-order", daemon=True).start()
 
     def _schedule(self):
         return {"steps": self.steps, "every": {"steps": self.every}}
 
     def Forecast(self):
-        def work(connected):
-            edits, schedule = self.edits(connected), self._schedule()
-
-            def task():
-                forecast = connected.run.forecast(edits, schedule=schedule)
-                reason = "" if forecast.reason is None else f", {forecast.reason}"
-                return f"{forecast.outcome}, least scaled Jacobian {forecast.min_scaled_jacobian}{reason}"
-
-            return task
-
-        self._work("forecast", work)
+        self._ask(lambda to: self._requests.forecast(to.run, self.edits(to), schedule=self._schedule()))
 
     def Give(self):
-        def work(connected):
-            edits, schedule = self.edits(connected), self._schedule()
-            return lambda: self._follow(connected.run.order(edits, schedule=schedule))
-
-        self._work("order", work)
+        self._ask(lambda to: self._requests.order(to.run, self.edits(to), schedule=self._schedule()))
 
     def Undo(self):
-        self._work("undo", lambda connected: lambda: self._follow(connected.run.undo()))
-
-    def _follow(self, order):
-        self._given = order
-        return f"given as {order.id}"
+        self._ask(lambda to: self._requests.undo(to.run))
 
     def _table(self):
-        rows = dict(self._rows)
-        order = self._given
-        if order is not None:
-            shape, shapes = order.shape
-            rows["status"] = f"{order.status}, shape {shape} of {shapes}"
-            if order.reason:
-                rows["reason"] = order.reason
-        connected = connection(self.link)
+        rows, connected = self._requests.outcomes, connection(self.link)
         if connected is not None and connected.run is not None:
-            rows["stack"] = f"{len(connected.run.stack)} edits"
+            rows["stack"] = f"{connected.run.edit_count} edits"
         return rows
 
     def GetNeedsUpdate(self):
@@ -747,10 +531,6 @@ class TomboloOrder(_Algorithm):
         if needed:
             self.Modified()
         return needed
-
-    def Refresh(self):
-        _breathe()
-        self.Modified()
 
     def run(self, output, surface):
         self._shown = self._table()

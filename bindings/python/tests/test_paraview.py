@@ -1,14 +1,18 @@
-"""The plug-in of ParaView, in ParaView's own Python."""
+"""The plug-in of ParaView: in plain VTK, and in ParaView's own Python where that is installed."""
 
+import importlib.util
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import tombolo
-from conftest import FLOW, ends, study
+from conftest import FLOW, ends, study, wait
 
 CLIENT = Path(__file__).parents[3] / "clients/paraview"
 SURFACE = {
@@ -21,6 +25,203 @@ SURFACE = {
         {"stream": {"error": {"relative": 1e-3}}},
     ],
 }
+
+
+class Plugin:
+    """The plug-in's classes in plain VTK, which has the same base class; what ParaView is told of them is kept."""
+
+    def __init__(self, monkeypatch):
+        algorithm = pytest.importorskip("vtkmodules.util.vtkAlgorithm")
+        self.errors, self.names, self.properties = [], {}, {}
+
+        def proxy(*, name, label, support_reload):
+            return lambda kind: self.names.setdefault(name, kind)
+
+        def properties(text):
+            def keep(kind):
+                self.properties[kind.__name__] = ElementTree.fromstring(f"<all>{text}</all>")
+                return kind
+
+            return keep
+
+        def hint(text):
+            assert ElementTree.fromstring(text).tag == "LiveSource"
+            return lambda kind: kind
+
+        stand_ins = {
+            "paraview": {"print_error": self.errors.append},
+            "paraview.util": {},
+            "paraview.util.vtkAlgorithm": {
+                "VTKPythonAlgorithmBase": algorithm.VTKPythonAlgorithmBase,
+                "smproxy": SimpleNamespace(source=proxy, filter=proxy),
+                "smproperty": SimpleNamespace(xml=properties),
+                "smhint": SimpleNamespace(xml=hint),
+            },
+        }
+        for name, members in stand_ins.items():
+            module = ModuleType(name)
+            vars(module).update(members)
+            monkeypatch.setitem(sys.modules, name, module)
+        file = CLIENT / "tombolo_paraview.py"
+        specification = importlib.util.spec_from_file_location(file.stem, file)
+        specification.loader.exec_module(importlib.util.module_from_spec(specification))
+
+    def make(self, name, *inputs, **properties):
+        """A source or filter with its properties, as ParaView would set them: by the commands in the XML."""
+        made = self.names[name]()
+        for port, given in enumerate(inputs):
+            made.SetInputConnection(port, given.GetOutputPort())
+        for element in self.properties[name]:
+            if element.get("name") in properties:
+                value = properties[element.get("name")]
+                values = value if isinstance(value, (list, tuple)) else [value]
+                assert len(values) == int(element.get("number_of_elements"))
+                getattr(made, element.get("command"))(*values)
+        return made
+
+
+@pytest.fixture
+def plugin(monkeypatch, connections):
+    """The plug-in in plain VTK."""
+    return Plugin(monkeypatch)
+
+
+def shown(source):
+    """What a source or filter shows now."""
+    source.Update()
+    return source.GetOutputDataObject(0)
+
+
+def newest(source):
+    """What a live source shows once there is something new, as ParaView's interface asks for it."""
+    wait(source.GetNeedsUpdate)
+    return shown(source)
+
+
+def expected_of(solver):
+    """The displacements that the filters of the tests are to make of a solver's mesh."""
+    shaper = tombolo.Shaper(solver.reference, {"tetra": solver.cells}, ends(solver.reference, solver.cells))
+    handle = {"features": ["top"], "fixed": ["bottom"]}
+    turned = {"rotate": {**handle, "axis": [0, 0, 1], "degrees": 20, "harmonic_order": 1}}
+    expected = {
+        "translate": shaper.displacement([{"translate": {**handle, "by": [0.1, 0, 0.2]}}]),
+        "rotate": shaper.displacement([turned]),
+        "scale_direction": shaper.displacement([{"scale_direction": {**handle, "factors": [0.5, 1, 1]}}]),
+        "scale_normals": shaper.displacement([{"scale_normals": {**handle, "distance": 0.1}}]),
+        "two": shaper.displacement([turned, {"translate": {**handle, "by": [0, 0, 0.1]}}]),
+    }
+    expected["sum"] = expected["translate"] + 0.5 * expected["rotate"]
+    return shaper, expected
+
+
+def test_each_command_of_the_interface_is_a_method_that_keeps_the_default(plugin):
+    assert len(plugin.names) == 12
+    for name, properties in plugin.properties.items():
+        made = plugin.names[name]()
+        before = made.GetMTime()
+        for element in properties:
+            if element.tag == "PropertyGroup":
+                assert element[0].get("name") in {other.get("name") for other in properties}
+            elif element.tag == "Property":
+                assert callable(getattr(made, element.get("command")))
+            elif element.tag != "InputProperty":
+                words = element.get("default_values").split()
+                values = words or [None] if element.tag == "StringVectorProperty" else [*map(float, words)]
+                assert len(values) == int(element.get("number_of_elements"))
+                getattr(made, element.get("command"))(*values)
+        assert made.GetMTime() == before, name
+
+
+def test_each_filter_moves_the_surface_in_plain_vtk(plugin, solver, tmp_path):
+    from tombolo import vtk
+
+    source = plugin.make("TomboloSurface", Link=solver.link)
+    assert newest(source).GetNumberOfPoints() > 0
+    assert not source.GetNeedsUpdate()
+    ends = {"Features": "top", "Fixed": " bottom, "}
+    made = {
+        "translate": plugin.make("TomboloTranslate", source, By=[0.1, 0, 0.2], **ends),
+        "rotate": plugin.make("TomboloRotate", source, Axis=[0, 0, 1], Degrees=20, HarmonicOrder=1, **ends),
+        "scale_direction": plugin.make("TomboloScaleDirection", source, Factors=[0.5, 1, 1], **ends),
+        "scale_normals": plugin.make("TomboloScaleNormals", source, Distance=0.1, **ends),
+    }
+    made["two"] = plugin.make("TomboloTranslate", made["rotate"], By=[0, 0, 0.1], **ends)
+    made["sum"] = plugin.make("TomboloCombine", made["translate"], made["rotate"], Weights=[1, 0.5])
+    shaper, expected = expected_of(solver)
+    for name, moved in expected.items():
+        assert np.array_equal(vtk.array(shown(made[name]).GetPointData(), "displacement"), moved), name
+    written = plugin.make("TomboloExport", made["two"], FileName=str(tmp_path / "two.txt"))
+    written.Write()
+    assert np.array_equal(shaper.displacement([{"displacement": {"file": str(tmp_path / "two.txt")}}]), expected["two"])
+    by_angle = plugin.make("TomboloFeaturesByAngle", source, Angle=40)
+    assert len(vtk.texts(shown(by_angle), "feature_names")) == 6
+    assert vtk.array(shown(plugin.make("TomboloSkeleton", source)).GetPointData(), "radius").min() > 0
+    assert plugin.errors == []
+
+    wrong = plugin.make("TomboloTranslate", source, Features="tpo", By=[0, 0, 1])
+    for _ in range(2):
+        wrong.Modified()
+        wrong.Update()
+    assert len(plugin.errors) == 1 and "tpo" in plugin.errors[0]
+    plugin.make("TomboloDragSkeleton", source, Fixed="bottom", At=[0.5, 0.5, 0.5], To=[0.6, 0.5, 0.5]).Update()
+    # A cube has no curve in its middle.
+    assert "no node that can be dragged" in plugin.errors[-1]
+
+
+def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
+    from tombolo import vtk
+
+    source = plugin.make("TomboloRun", Link=solver.link)
+    first = vtk.array(newest(source).GetFieldData(), "cycle")[0]
+    frame = newest(source)
+    assert vtk.array(frame.GetFieldData(), "cycle")[0] > first
+    assert frame.GetPointData().HasArray("temperature") and frame.GetCellData().HasArray("material")
+    source.SetView("nothing")
+    newest(source)
+    assert "no view 'nothing'; there are: midplane" in plugin.errors[-1]
+    assert not source.GetNeedsUpdate()
+
+    surface = plugin.make("TomboloSurface", Link=solver.link)
+    newest(surface)
+    edits = plugin.make("TomboloTranslate", surface, Features="top", Fixed="bottom", By=[0, 0, -0.2])
+    order = plugin.make("TomboloOrder", edits, Link=solver.link, Steps=2, Every=1)
+    begin = solver.points.copy()
+
+    def rows():
+        order.Refresh()
+        table = shown(order)
+        texts = (
+            [table.GetValue(row, column).ToString() for column in (0, 1)] for row in range(table.GetNumberOfRows())
+        )
+        return dict(texts)
+
+    order.Forecast()
+    wait(lambda: rows()["forecast"].startswith("applied"))
+    assert rows()["stack"] == "0 edits"
+    order.Give()
+    wait(lambda: rows().get("status", "").startswith("applied"))
+    wait(lambda: rows()["stack"] == "1 edits")
+    assert solver.points[:, 2].max() == pytest.approx(0.8)
+    order.Undo()
+    wait(lambda: rows()["stack"] == "0 edits" and rows()["status"].startswith("applied"))
+    wait(lambda: np.array_equal(solver.points, begin))
+    # As how far points lie from the reference: none of them has moved.
+    order.SetArray(None)
+    order.SetInputConnection(surface.GetOutputPort())
+    assert order.edits(SimpleNamespace(surface=tombolo.background.connection(solver.link).surface)) == [
+        {"displacement": {"vertices": [], "values": []}}
+    ]
+
+
+def test_why_there_is_no_run_is_told_once_in_plain_vtk(plugin, tmp_path):
+    (tmp_path / "run.link").write_text("nothing")
+    source = plugin.make("TomboloRun", Link=str(tmp_path / "run.link"))
+    newest(source)
+    assert len(plugin.errors) == 1 and "expected http://" in plugin.errors[0]
+    assert not source.GetNeedsUpdate()
+    order = plugin.make("TomboloOrder", source, Link=str(tmp_path / "run.link"))
+    order.Give()
+    assert "expected http://" in plugin.errors[-1]
 
 
 def pvpython(*arguments):
@@ -77,17 +278,7 @@ def test_each_filter_moves_the_surface_as_the_kernel_does(solver, tmp_path):
     # A cube has no curve in its middle.
     assert "no node that can be dragged" in said, said
 
-    shaper = tombolo.Shaper(solver.reference, {"tetra": solver.cells}, ends(solver.reference, solver.cells))
-    handle = {"features": ["top"], "fixed": ["bottom"]}
-    turned = {"rotate": {**handle, "axis": [0, 0, 1], "degrees": 20, "harmonic_order": 1}}
-    expected = {
-        "translate": shaper.displacement([{"translate": {**handle, "by": [0.1, 0, 0.2]}}]),
-        "rotate": shaper.displacement([turned]),
-        "scale_direction": shaper.displacement([{"scale_direction": {**handle, "factors": [0.5, 1, 1]}}]),
-        "scale_normals": shaper.displacement([{"scale_normals": {**handle, "distance": 0.1}}]),
-        "two": shaper.displacement([turned, {"translate": {**handle, "by": [0, 0, 0.1]}}]),
-    }
-    expected["sum"] = expected["translate"] + 0.5 * expected["rotate"]
+    shaper, expected = expected_of(solver)
     for name, moved in expected.items():
         assert np.array_equal(pyvista.read(tmp_path / f"{name}.vtp").point_data["displacement"], moved), name
     written = shaper.displacement([{"displacement": {"file": str(tmp_path / "two.txt")}}])
