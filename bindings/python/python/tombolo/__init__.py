@@ -6,7 +6,11 @@ Three ways in:
 - **From outside**: `connect` to a run that goes on elsewhere; a `Run` watches and steers it.
 - **Without a run**: a `Shaper` gives a mesh another shape.
 
-See docs/python.md for a tutorial.
+Three modules are imported by themselves: `tombolo.vtk` for data objects of VTK, `tombolo.background` for programs
+with an interface, `tombolo.jupyter` for notebooks.
+
+What a class is for and how it is used is in its own help, such as ``help(tombolo.Shaper)``. See docs/python.md for a
+tutorial.
 """
 
 from ._native import DISTRIBUTED as _DISTRIBUTED
