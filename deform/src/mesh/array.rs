@@ -114,6 +114,7 @@ impl Values<'_> {
         }
     }
 
+    #[inline]
     fn get(&self, index: usize) -> f64 {
         match self {
             Values::F32(values) => f64::from(values[index]),
@@ -254,6 +255,7 @@ impl<'a> ArrayView<'a> {
     /// # Panics
     /// Where `tuple` or `component` is out of range.
     #[must_use]
+    #[inline]
     pub fn get(&self, tuple: usize, component: usize) -> f64 {
         assert!(
             component < self.components && tuple < self.len,
@@ -269,6 +271,7 @@ impl<'a> ArrayView<'a> {
     /// # Panics
     /// Where `tuple` is out of range.
     #[must_use]
+    #[inline]
     pub fn vector(&self, tuple: usize) -> Vector {
         std::array::from_fn(|component| {
             if component < self.components { self.get(tuple, component) } else { 0.0 }
@@ -286,7 +289,8 @@ impl<'a> ArrayView<'a> {
     }
 
     /// The values as they lie in memory, where they lie tuple after tuple in double precision.
-    pub(super) fn contiguous(&self) -> Option<&'a [f64]> {
+    #[must_use]
+    pub fn contiguous(&self) -> Option<&'a [f64]> {
         let Values::F64(first) = self.columns[0].values else { return None };
         let follows = |(component, column): (usize, &Column<'a>)| {
             let is_same =

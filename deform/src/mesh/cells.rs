@@ -212,6 +212,7 @@ impl Cells {
     /// # Panics
     /// Where `cell` is not below [`Cells::len`].
     #[must_use]
+    #[inline]
     pub fn cell_type(&self, cell: usize) -> CellType {
         self.types[cell]
     }
@@ -228,6 +229,7 @@ impl Cells {
     /// # Panics
     /// Where `cell` is not below [`Cells::len`].
     #[must_use]
+    #[inline]
     pub fn vertices(&self, cell: usize) -> &[u32] {
         &self.connectivity[self.starts.range(cell)]
     }

@@ -1,4 +1,5 @@
-//! Runs of cells with the vertices that they have, so that most cells need not be looked at.
+//! Runs of cells with the vertices that they have, and the sides of a surface on which these lie, so
+//! that most cells need not be looked at.
 
 use std::ops::Range;
 
@@ -6,47 +7,157 @@ use tombolo_deform::mesh::Cells;
 
 /// Cells of a block. Where neighbours in the numbering are neighbours in space, so many tetrahedra
 /// have about half as many vertices.
-const CELLS: usize = 64;
+const CELLS: usize = 16;
 
-/// Blocks of cells that follow one another, each with its vertices. It depends on the cells alone,
-/// and takes some three bytes a tetrahedron.
+/// Blocks of cells that follow one another, each with its vertices as bits. It depends on the cells
+/// alone, and takes one to eight bytes a tetrahedron, the fewer the closer the numbers of neighbours.
 #[derive(Debug)]
 pub(super) struct Blocks {
     cells: usize,
-    /// Where each block's vertices end.
+    /// Where the words of each block end.
     ends: Vec<usize>,
-    vertices: Vec<u32>,
+    /// The numbers of the words in which a block has vertices, and its vertices in each.
+    words: Vec<(u32, u64)>,
 }
 
 impl Blocks {
     pub(super) fn new(cells: &Cells, points: usize) -> Self {
-        let (mut ends, mut vertices) = (Vec::new(), Vec::new());
-        let mut last_block = vec![usize::MAX; points];
+        let (mut ends, mut words): (_, Vec<(u32, u64)>) = (Vec::new(), Vec::new());
+        // Where the block that last had vertices of a word keeps them.
+        let mut last = vec![usize::MAX; points.div_ceil(64)];
         for block in 0..cells.len().div_ceil(CELLS) {
+            let start = words.len();
             for cell in range(block, cells.len()) {
                 for &vertex in cells.vertices(cell) {
-                    if std::mem::replace(&mut last_block[vertex as usize], block) != block {
-                        vertices.push(vertex);
+                    let (word, bit) = bit(vertex);
+                    let known = &mut last[word];
+                    if *known == usize::MAX || *known < start {
+                        *known = words.len();
+                        words.push((vertex / 64, 0));
                     }
+                    words[*known].1 |= bit;
                 }
             }
-            ends.push(vertices.len());
+            ends.push(words.len());
         }
-        Self { cells: cells.len(), ends, vertices }
+        words.shrink_to_fit();
+        Self { cells: cells.len(), ends, words }
     }
 
-    /// The cells and the vertices of each block.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[u32])> {
+    /// The cells of each block, and the words that have its vertices.
+    fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[(u32, u64)])> {
         let mut start = 0;
         self.ends.iter().enumerate().map(move |(block, &end)| {
-            let vertices = &self.vertices[std::mem::replace(&mut start, end)..end];
-            (range(block, self.cells), vertices)
+            let words = &self.words[std::mem::replace(&mut start, end)..end];
+            (range(block, self.cells), words)
         })
     }
+
+    /// The cells of the blocks with vertices on both sides.
+    pub(super) fn crossed(&self, sides: &Sides) -> impl Iterator<Item = usize> {
+        let is_crossed = |words: &[(u32, u64)]| {
+            let [behind, ahead, _] = sides.of_block(words);
+            behind && ahead
+        };
+        self.iter().filter(move |(_, words)| is_crossed(words)).flat_map(|(cells, _)| cells)
+    }
+
+    /// Each block, and what is known of its cells where all functions are to be 0 or above.
+    pub(super) fn within(
+        &self,
+        functions: &[Sides],
+    ) -> impl Iterator<Item = (Range<usize>, Within)> {
+        let within = move |words: &[(u32, u64)]| {
+            let mut within = Within::All;
+            for sides in functions {
+                match sides.of_block(words) {
+                    [true, false, false] => return Within::None,
+                    [false, true, false] => {}
+                    _ => within = Within::Unknown,
+                }
+            }
+            within
+        };
+        self.iter().map(move |(cells, words)| (cells, within(words)))
+    }
+}
+
+/// Which cells of a block lie where all of some functions are 0 or above.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Within {
+    All,
+    None,
+    /// Each cell is to be looked at.
+    Unknown,
 }
 
 fn range(block: usize, cells: usize) -> Range<usize> {
     block * CELLS..cells.min((block + 1) * CELLS)
+}
+
+/// The word that has a vertex, and its bit there.
+#[inline]
+fn bit(vertex: u32) -> (usize, u64) {
+    ((vertex / 64) as usize, 1 << (vertex % 64))
+}
+
+/// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is 0
+/// or above, neither where it is NaN.
+pub(super) struct Sides {
+    behind: Vec<u64>,
+    ahead: Vec<u64>,
+}
+
+impl Sides {
+    pub(super) fn new(vertices: usize, value: impl Fn(usize) -> f64) -> Self {
+        let (mut behind, mut ahead) = (Vec::new(), Vec::new());
+        for start in (0..vertices).step_by(64) {
+            let (mut below, mut above) = (0_u64, 0_u64);
+            for vertex in start..vertices.min(start + 64) {
+                let value = value(vertex);
+                below |= u64::from(value < 0.0) << (vertex - start);
+                above |= u64::from(value >= 0.0) << (vertex - start);
+            }
+            behind.push(below);
+            ahead.push(above);
+        }
+        Self { behind, ahead }
+    }
+
+    #[inline]
+    pub(super) fn is_ahead(&self, vertex: u32) -> bool {
+        let (word, bit) = bit(vertex);
+        self.ahead[word] & bit != 0
+    }
+
+    #[inline]
+    pub(super) fn is_behind(&self, vertex: u32) -> bool {
+        let (word, bit) = bit(vertex);
+        self.behind[word] & bit != 0
+    }
+
+    /// Whether these vertices lie on both sides, and none of them on neither.
+    #[inline]
+    pub(super) fn are_crossed(&self, vertices: &[u32]) -> bool {
+        let (mut behind, mut ahead) = (0, 0);
+        for &vertex in vertices {
+            behind += usize::from(self.is_behind(vertex));
+            ahead += usize::from(self.is_ahead(vertex));
+        }
+        behind > 0 && ahead > 0 && behind + ahead == vertices.len()
+    }
+
+    /// Whether a block has vertices behind, ahead, and on neither side.
+    fn of_block(&self, words: &[(u32, u64)]) -> [bool; 3] {
+        let (mut behind, mut ahead, mut neither) = (0, 0, 0);
+        for &(word, vertices) in words {
+            let [below, above] = [self.behind[word as usize], self.ahead[word as usize]];
+            behind |= below & vertices;
+            ahead |= above & vertices;
+            neither |= vertices & !(below | above);
+        }
+        [behind != 0, ahead != 0, neither != 0]
+    }
 }
 
 #[cfg(test)]
@@ -59,16 +170,33 @@ mod tests {
     fn every_cell_is_in_one_block_that_has_its_vertices() {
         let mesh = box_of_mixed_cells([7, 5, 4], [0.0; 3], [1.0; 3]);
         let (cells, mut next) = (mesh.cells(), 0);
-        for (block, vertices) in Blocks::new(cells, mesh.points().len()).iter() {
+        for (block, words) in Blocks::new(cells, mesh.points().len()).iter() {
             assert_eq!(std::mem::replace(&mut next, block.end), block.start);
             let mut of_cells: Vec<u32> =
                 block.flat_map(|cell| cells.vertices(cell)).copied().collect();
             of_cells.sort_unstable();
             of_cells.dedup();
-            let mut vertices = vertices.to_vec();
+            let mut vertices: Vec<u32> = words
+                .iter()
+                .flat_map(|&(word, bits)| {
+                    (0..64).filter(move |bit| bits >> bit & 1 == 1).map(move |bit| 64 * word + bit)
+                })
+                .collect();
             vertices.sort_unstable();
             assert_eq!(vertices, of_cells);
         }
         assert_eq!(next, cells.len());
+    }
+
+    #[test]
+    fn a_vertex_at_0_lies_ahead_and_one_without_a_value_on_neither_side() {
+        let values = [-1.0, 0.0, f64::NAN, 2.0, -0.5];
+        let sides = Sides::new(values.len(), |vertex| values[vertex]);
+        let sides_of = |vertex| [sides.is_behind(vertex), sides.is_ahead(vertex)];
+        let expected = [[true, false], [false, true], [false; 2], [false, true], [true, false]];
+        assert_eq!([0, 1, 2, 3, 4].map(sides_of), expected);
+        assert!(sides.are_crossed(&[0, 1, 3]));
+        assert!(!sides.are_crossed(&[0, 1, 2]), "one has no value");
+        assert!(!sides.are_crossed(&[0, 4]) && !sides.are_crossed(&[1, 3]));
     }
 }

@@ -8,7 +8,6 @@ use tombolo_deform::vector::{add, determinant, scale, subtract};
 
 use super::cut::{ByVertices, mixed};
 use super::decompose::Faces;
-use super::function::Samples;
 use super::gather::Rows;
 use super::pattern::{Base, Pattern};
 use super::source::{Origin, Support};
@@ -47,7 +46,7 @@ impl Piece {
 }
 
 /// The signs of the functions at a vertex.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Signs {
     /// By bits, the functions that are below 0.
     below: u8,
@@ -62,16 +61,20 @@ pub(super) struct Clipper<'a> {
     cells: &'a Cells,
     points: &'a [Vector],
     /// The values of at most eight functions at the vertices.
-    samples: &'a [Samples],
+    values: &'a [Vec<f64>],
     /// The numbers of the vertices in the whole mesh, where this is a part of one.
     numbers: Option<&'a [u32]>,
     invert: bool,
     signs: Vec<Signs>,
     nodes: Vec<Node>,
     of_vertices: Vec<u32>,
+    points_of_vertices: Vec<u32>,
     /// Nodes by the two between which they lie, and the function that is 0 there.
     between: ByVertices<(u32, u32, usize)>,
     faces: Faces,
+    simplices: Vec<[u32; 4]>,
+    /// The points of the cell that is taken whole.
+    whole: Vec<u32>,
     cell: u32,
     made: Cells,
     owners: Vec<u32>,
@@ -83,31 +86,32 @@ impl<'a> Clipper<'a> {
     pub(super) fn new(
         cells: &'a Cells,
         points: &'a [Vector],
-        samples: &'a [Samples],
+        values: &'a [Vec<f64>],
         numbers: Option<&'a [u32]>,
         invert: bool,
     ) -> Self {
-        let bits = |vertex: usize, test: &dyn Fn(f64) -> bool| {
-            let bit = |(index, values): (usize, &Samples)| u8::from(test(values[vertex])) << index;
-            samples.iter().enumerate().map(bit).fold(0, |bits, bit| bits | bit)
-        };
-        let signs = |vertex: usize| Signs {
-            below: bits(vertex, &|value| value < 0.0),
-            not_above: bits(vertex, &|value| value <= 0.0),
-            is_lacking: samples.iter().any(|values| values[vertex].is_nan()),
-        };
-        let count = if samples.iter().any(Vec::is_empty) { 0 } else { points.len() };
+        let mut signs = vec![Signs::default(); points.len()];
+        for (index, of_function) in values.iter().enumerate() {
+            for (signs, &value) in signs.iter_mut().zip(of_function) {
+                signs.below |= u8::from(value < 0.0) << index;
+                signs.not_above |= u8::from(value <= 0.0) << index;
+                signs.is_lacking |= value.is_nan();
+            }
+        }
         Self {
             cells,
             points,
-            samples,
+            values,
             numbers,
             invert,
-            signs: (0..count).map(signs).collect(),
+            signs,
             nodes: Vec::new(),
-            of_vertices: vec![u32::MAX; count],
+            of_vertices: vec![u32::MAX; points.len()],
+            points_of_vertices: vec![u32::MAX; points.len()],
             between: ByVertices::default(),
             faces: Faces::default(),
+            simplices: Vec::new(),
+            whole: Vec::new(),
             cell: 0,
             made: Cells::new(),
             owners: Vec::new(),
@@ -129,10 +133,6 @@ impl<'a> Clipper<'a> {
         if is_lacking || dimension < 2 {
             return Ok(());
         }
-        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
-        {
-            self.cell = cell as u32;
-        }
         let (is_inside, is_outside) = (below == 0, below & not_above != 0);
         match (is_inside, is_outside) {
             (true, _) if self.invert => Ok(()),
@@ -142,38 +142,49 @@ impl<'a> Clipper<'a> {
         }
     }
 
-    fn whole(&mut self, cell: usize) -> Result<(), MeshError> {
+    /// Takes a cell as it is, unless it is of lower dimension.
+    pub(super) fn whole(&mut self, cell: usize) -> Result<(), MeshError> {
         let cells = self.cells;
-        match cells.polyhedron_faces(cell) {
-            [] => {
-                let vertices = self.numbered(cells.vertices(cell));
-                self.made.push(cells.cell_type(cell), &vertices)?;
-            }
-            faces => {
-                let faces: Vec<Vec<u32>> = faces.iter().map(|face| self.numbered(face)).collect();
-                self.made.push_polyhedron(&faces)?;
-            }
+        let cell_type = cells.cell_type(cell);
+        if cell_type.dimension() < 2 {
+            return Ok(());
         }
-        self.owners.push(self.cell);
+        let mut points = std::mem::take(&mut self.whole);
+        if cell_type == CellType::Polyhedron {
+            let mut numbered = |face: &Vec<u32>| {
+                self.numbered(face, &mut points);
+                points.clone()
+            };
+            let faces: Vec<_> = cells.polyhedron_faces(cell).iter().map(&mut numbered).collect();
+            self.made.push_polyhedron(&faces)?;
+        } else {
+            self.numbered(cells.vertices(cell), &mut points);
+            self.made.push(cell_type, &points)?;
+        }
+        self.whole = points;
+        self.owners.push(number(cell));
         Ok(())
     }
 
     fn decomposed(&mut self, cell: usize, dimension: usize) -> Result<(), MeshError> {
         let numbers = self.numbers;
         let key = |vertex: u32| numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
-        let mut simplices = Vec::new();
+        self.cell = number(cell);
+        let mut simplices = std::mem::take(&mut self.simplices);
+        simplices.clear();
         self.faces.decompose(self.cells, cell, key, &mut simplices);
         let cell_type = if dimension == 3 { CellType::Tetra } else { CellType::Triangle };
-        for simplex in simplices {
+        for simplex in &simplices {
             let nodes = simplex.map(|v| if v == u32::MAX { v } else { self.vertex(v) });
             self.simplex(Piece::new(cell_type, &nodes), 0)?;
         }
+        self.simplices = simplices;
         Ok(())
     }
 
     /// Takes what is to be kept of a simplex, by the functions from this one on.
     fn simplex(&mut self, simplex: Piece, from: usize) -> Result<(), MeshError> {
-        let functions = from..self.samples.len();
+        let functions = from..self.values.len();
         let is_below = |function: &usize| {
             simplex.nodes().iter().any(|&node| self.value(node, *function) < 0.0)
         };
@@ -199,19 +210,25 @@ impl<'a> Clipper<'a> {
 
     /// The part of a simplex in which the function, times a sign, is above 0.
     fn part(&mut self, simplex: &Piece, function: usize, sign: f64) -> Option<Piece> {
-        let mut ahead = Vec::with_capacity(4);
-        let mut behind = Vec::with_capacity(4);
+        let (mut ahead, mut behind) = ([0; 4], [0; 4]);
+        let (mut ahead_count, mut behind_count) = (0, 0);
         let mut is_above = false;
         for &node in simplex.nodes() {
             let value = sign * self.value(node, function);
             is_above |= value > 0.0;
-            if value >= 0.0 { ahead.push(node) } else { behind.push(node) }
+            let (side, count) = if value >= 0.0 {
+                (&mut ahead, &mut ahead_count)
+            } else {
+                (&mut behind, &mut behind_count)
+            };
+            side[*count] = node;
+            *count += 1;
         }
         if !is_above {
             return None;
         }
         let is_zero = |nodes: &Self, node: u32| nodes.value(node, function) == 0.0;
-        let piece = match (ahead.as_slice(), behind.as_slice()) {
+        let piece = match (&ahead[..ahead_count], &behind[..behind_count]) {
             (_, []) => *simplex,
             (&[a], &[b, c]) => {
                 let [ab, ac] = [b, c].map(|other| self.between(a, other, function));
@@ -296,7 +313,7 @@ impl<'a> Clipper<'a> {
         if zero >> function & 1 == 1 {
             return 0.0;
         }
-        let values = &self.samples[function];
+        let values = &self.values[function];
         let parts = support.vertices().zip(weights);
         parts.map(|(vertex, weight)| weight * values[vertex as usize]).sum()
     }
@@ -318,10 +335,7 @@ impl<'a> Clipper<'a> {
 
     fn add(&mut self, node: Node) -> u32 {
         self.nodes.push(node);
-        #[expect(clippy::cast_possible_truncation, reason = "a few nodes for each vertex")]
-        {
-            (self.nodes.len() - 1) as u32
-        }
+        number(self.nodes.len() - 1)
     }
 
     /// The node between two others at which the function is 0.
@@ -336,18 +350,15 @@ impl<'a> Clipper<'a> {
         }
         let fraction = at_near / (at_near - at_far);
         let [a, b] = [near, far].map(|node| self.nodes[node as usize]);
-        let mut vertices: Vec<u32> = a.support.vertices().chain(b.support.vertices()).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
         let [one, other] = [a, b].map(|node| node.support.layer);
         let name = mixed(mixed(one.min(other), one.max(other)), function as u64);
-        let support = Support::new(&vertices, name);
+        let support = a.support.with(&b.support, name);
         let weight = |node: &Node, vertex: u32| {
             let mut parts = node.support.vertices().zip(node.weights);
             parts.find(|(known, _)| *known == vertex).map_or(0.0, |(_, weight)| weight)
         };
         let mut weights = [0.0; 4];
-        for (slot, &vertex) in weights.iter_mut().zip(&vertices) {
+        for (slot, vertex) in weights.iter_mut().zip(support.vertices()) {
             *slot = (1.0 - fraction) * weight(&a, vertex) + fraction * weight(&b, vertex);
         }
         let zero = a.zero & b.zero | 1 << function;
@@ -367,22 +378,24 @@ impl<'a> Clipper<'a> {
     fn number(&mut self, node: u32) -> u32 {
         let number = &mut self.nodes[node as usize].number;
         if *number == u32::MAX {
-            #[expect(clippy::cast_possible_truncation, reason = "no more points than nodes")]
-            {
-                *number = self.used.len() as u32;
-            }
+            *number = self::number(self.used.len());
             self.used.push(node);
         }
         *number
     }
 
-    /// The points at vertices.
-    fn numbered(&mut self, vertices: &[u32]) -> Vec<u32> {
-        let number = |&vertex: &u32| {
-            let node = self.vertex(vertex);
-            self.number(node)
-        };
-        vertices.iter().map(number).collect()
+    /// Finds the points at vertices.
+    fn numbered(&mut self, vertices: &[u32], points: &mut Vec<u32>) {
+        points.clear();
+        for &vertex in vertices {
+            let mut point = self.points_of_vertices[vertex as usize];
+            if point == u32::MAX {
+                let node = self.vertex(vertex);
+                point = self.number(node);
+                self.points_of_vertices[vertex as usize] = point;
+            }
+            points.push(point);
+        }
     }
 
     /// Appends a piece, turned right-handed.
@@ -411,8 +424,8 @@ impl<'a> Clipper<'a> {
             }
         }
         let count = piece.nodes().len();
-        let points: Vec<u32> = nodes[..count].iter().map(|&node| self.number(node)).collect();
-        self.made.push(piece.cell_type, &points)?;
+        let points = nodes.map(|node| if node == u32::MAX { node } else { self.number(node) });
+        self.made.push(piece.cell_type, &points[..count])?;
         self.owners.push(self.cell);
         Ok(())
     }
@@ -434,4 +447,12 @@ impl<'a> Clipper<'a> {
             origin: Origin::Between(supports.into()),
         }
     }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "cells are numbered with 32 bits, and so are their vertices and what lies between these"
+)]
+fn number(index: usize) -> u32 {
+    index as u32
 }

@@ -13,8 +13,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::vector::{add, cross, dot, subtract};
 
-use super::blocks::Blocks;
-use super::function::Samples;
+use super::blocks::{Blocks, Sides};
 use super::gather::Crossing;
 
 /// The cut of a mesh.
@@ -34,63 +33,40 @@ pub(super) struct Cut {
 /// A vertex at which the function is 0 counts to the side above, so that a face on which it is 0 is
 /// cut out once, by the cell behind it.
 ///
-/// There are `layers` functions, one after the other; `sample` gives the values of one. Cells for
-/// which `counts` does not hold are passed over, and those with a vertex at which it is NaN.
-/// `blocks` are those of the cells.
+/// There are `layers` functions, one after the other; `value` is that of a function at a vertex.
+/// Cells for which `counts` does not hold are passed over, and those with a vertex at which it is
+/// NaN. `blocks` are those of the cells.
 pub(super) fn cut(
     cells: &Cells,
     blocks: &Blocks,
     points: &[Vector],
     layers: usize,
-    sample: &dyn Fn(usize) -> Samples,
-    counts: &dyn Fn(usize) -> bool,
+    value: impl Fn(usize, usize) -> f64,
+    counts: impl Fn(usize) -> bool,
 ) -> Result<Cut, MeshError> {
     let mut cut = Cut::default();
     for (layer, index) in (0..).zip(0..layers) {
-        let values = sample(index);
-        let sides: Vec<u8> = values.iter().copied().map(side).collect();
+        let value = |vertex: usize| value(index, vertex);
+        let sides = Sides::new(points.len(), value);
         let mut cutter = Cutter {
             layer,
-            values: &values,
+            value,
             sides: &sides,
             coordinates: points,
-            known: KnownEdges::new(values.len(), cut.points.len()),
+            known: KnownEdges::new(points.len(), cut.points.len()),
             segments: Vec::new(),
             polygon: Vec::new(),
             directions: Vec::new(),
             cut,
         };
-        let sides_of = |vertices: &[u32]| {
-            vertices.iter().fold(0, |sides_of, &vertex| sides_of | sides[vertex as usize])
-        };
-        for (block, vertices) in blocks.iter() {
-            if sides_of(vertices) & (BEHIND | AHEAD) != BEHIND | AHEAD {
-                continue;
-            }
-            for cell in block {
-                if sides_of(cells.vertices(cell)) == BEHIND | AHEAD && counts(cell) {
-                    cutter.cell(cells, cell)?;
-                }
+        for cell in blocks.crossed(&sides) {
+            if sides.are_crossed(cells.vertices(cell)) && counts(cell) {
+                cutter.cell(cells, cell)?;
             }
         }
         cut = cutter.cut;
     }
     Ok(cut)
-}
-
-/// The sides on which a vertex can lie.
-const BEHIND: u8 = 1;
-const AHEAD: u8 = 2;
-const NOWHERE: u8 = 4;
-
-fn side(value: f64) -> u8 {
-    if value >= 0.0 {
-        AHEAD
-    } else if value < 0.0 {
-        BEHIND
-    } else {
-        NOWHERE
-    }
 }
 
 /// Spreads the numbers of an edge's ends over 64 bits by the golden ratio (D. E. Knuth, *The Art of
@@ -177,10 +153,11 @@ impl KnownEdges {
     }
 }
 
-struct Cutter<'a> {
+struct Cutter<'a, V> {
     layer: u32,
-    values: &'a [f64],
-    sides: &'a [u8],
+    /// The function's value at a vertex.
+    value: V,
+    sides: &'a Sides,
     coordinates: &'a [Vector],
     known: KnownEdges,
     /// The cell's segments: from the edge where the face's boundary leaves the side ahead to that
@@ -192,7 +169,7 @@ struct Cutter<'a> {
     cut: Cut,
 }
 
-impl Cutter<'_> {
+impl<V: Fn(usize) -> f64> Cutter<'_, V> {
     fn cell(&mut self, cells: &Cells, cell: usize) -> Result<(), MeshError> {
         let cell_type = cells.cell_type(cell);
         let vertices = cells.vertices(cell);
@@ -231,7 +208,7 @@ impl Cutter<'_> {
         let (mut ahead, mut behind) = ([0; 4], [0; 4]);
         let (mut ahead_count, mut behind_count) = (0, 0);
         for vertex in vertices {
-            if self.sides[vertex as usize] == AHEAD {
+            if self.sides.is_ahead(vertex) {
                 ahead[ahead_count] = vertex;
                 ahead_count += 1;
             } else {
@@ -261,8 +238,8 @@ impl Cutter<'_> {
 
     /// The segments of one face: one for each run of its corners ahead.
     fn face(&mut self, face: &[u32]) {
-        let is_ahead_at = |vertex: u32| self.sides[vertex as usize] == AHEAD;
-        let ahead = |corner: usize| is_ahead_at(face[corner % face.len()]);
+        let sides = self.sides;
+        let ahead = |corner: usize| sides.is_ahead(face[corner % face.len()]);
         let Some(start) = (0..face.len()).find(|&corner| !ahead(corner) && ahead(corner + 1))
         else {
             return;
@@ -270,8 +247,7 @@ impl Cutter<'_> {
         let mut enter = None;
         for corner in start..start + face.len() {
             let edge = [face[corner % face.len()], face[(corner + 1) % face.len()]];
-            let is_ahead_at = |vertex: u32| self.sides[vertex as usize] == AHEAD;
-            match (is_ahead_at(edge[0]), is_ahead_at(edge[1])) {
+            match (sides.is_ahead(edge[0]), sides.is_ahead(edge[1])) {
                 (false, true) => {
                     let [behind, ahead] = edge.map(|vertex| self.coordinates[vertex as usize]);
                     let point = self.crossing(edge);
@@ -290,7 +266,7 @@ impl Cutter<'_> {
     /// The number of the point on an edge whose ends lie on two sides.
     fn crossing(&mut self, edge: [u32; 2]) -> u32 {
         let [a, b] = if edge[0] <= edge[1] { edge } else { [edge[1], edge[0]] };
-        let [at_a, at_b] = [a, b].map(|end| self.values[end as usize]);
+        let [at_a, at_b] = [a, b].map(|end| (self.value)(end as usize));
         let edge = match (at_a == 0.0, at_b == 0.0) {
             (true, _) => [a, a],
             (_, true) => [b, b],

@@ -19,7 +19,7 @@ pub(super) enum Function {
 }
 
 impl Function {
-    fn value(&self, point: Vector) -> f64 {
+    pub(super) fn value(&self, point: Vector) -> f64 {
         match *self {
             Function::Plane { origin, normal } => dot(subtract(point, origin), normal),
             Function::Cylinder { origin, axis, radius } => {
@@ -75,33 +75,25 @@ fn unit(direction: Vector) -> Vector {
     direction.map(|x| x / length)
 }
 
-/// The values of one function, one for each vertex.
-pub(super) type Samples = Vec<f64>;
-
-/// The values of a function at each point.
-pub(super) fn samples(function: &Function, points: &[Vector]) -> Samples {
-    points.iter().map(|point| function.value(*point)).collect()
-}
-
 /// How far from 0 a value may be that is 0 but for rounding, for each of `count` functions: slivers
-/// beside a vertex would mean nothing. Collective.
+/// beside a vertex would mean nothing. `value` is that of a function at a vertex. Collective.
 pub(super) fn slacks(
     count: usize,
-    sample: &dyn Fn(usize) -> Samples,
+    vertices: usize,
+    value: impl Fn(usize, usize) -> f64,
     communicator: &dyn Communicator,
 ) -> Vec<f64> {
     // `max` passes NaN over.
-    let furthest =
-        |index: usize| sample(index).iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let furthest = |index: usize| {
+        (0..vertices).fold(0.0_f64, |most, vertex| most.max(value(index, vertex).abs()))
+    };
     let mut furthest: Vec<f64> = (0..count).map(furthest).collect();
     communicator.reduce(Reduction::Maximum, &mut furthest);
     furthest.iter().map(|furthest| 1e-12 * furthest).collect()
 }
 
-/// The values, those that are 0 but for rounding put to 0.
-pub(super) fn settled(mut values: Samples, slack: f64) -> Samples {
-    for value in values.iter_mut().filter(|value| value.abs() <= slack) {
-        *value = 0.0;
-    }
-    values
+/// The value, or 0 where it is that but for rounding.
+#[inline]
+pub(super) fn settled(value: f64, slack: f64) -> f64 {
+    if value.abs() <= slack { 0.0 } else { value }
 }

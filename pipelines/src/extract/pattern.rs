@@ -87,8 +87,18 @@ impl Pattern {
         size_of::<Vector>() * self.points.len() + 4 * self.owners.len() + base + cells + origin
     }
 
-    /// The extract with the fields of this step.
+    /// The extract with the fields of this step; the pattern may be needed again.
     pub(super) fn fill(&self, input: &Input) -> Extracted {
+        self.filled(input, self.points.clone())
+    }
+
+    /// The extract with the fields of this step, where the pattern is of use for no other.
+    pub(super) fn fill_once(mut self, input: &Input) -> Extracted {
+        let points = std::mem::take(&mut self.points);
+        self.filled(input, points)
+    }
+
+    fn filled(&self, input: &Input, coordinates: Vec<Vector>) -> Extracted {
         let points = match &self.base {
             Base::Vertices(vertices) => Points::Vertices(vertices),
             Base::Crossings(crossings) => Points::Crossings(crossings),
@@ -108,7 +118,7 @@ impl Pattern {
             _ => None,
         };
         let extract = Extract {
-            points: self.points.clone(),
+            points: coordinates,
             vertices,
             cells: Arc::clone(&self.cells),
             features: None,

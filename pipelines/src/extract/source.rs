@@ -66,6 +66,19 @@ impl Support {
         Self { vertices: all, layer }
     }
 
+    /// The point between its vertices and those of another, together at most four.
+    pub(crate) fn with(&self, other: &Self, layer: u64) -> Self {
+        let mut all = [u32::MAX; 8];
+        let mut count = 0;
+        for vertex in self.vertices().chain(other.vertices()) {
+            if !all[..count].contains(&vertex) {
+                all[count] = vertex;
+                count += 1;
+            }
+        }
+        Self::new(&all[..count], layer)
+    }
+
     /// Its vertices.
     pub(crate) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
         self.vertices.iter().copied().filter(|&vertex| vertex != u32::MAX)

@@ -1,12 +1,14 @@
 //! The source stages: what is taken out of a channel's mesh.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use tombolo_deform::mesh::{NumberType, Vector, ghosts};
 
+use super::blocks::{Sides, Within};
 use super::clip::Clipper;
 use super::cut::cut;
-use super::function::{Function, Samples, samples, settled, slacks};
+use super::function::{Function, settled, slacks};
 use super::gather::check_length;
 use super::pattern::{Base, Input, Kept, Pattern};
 use super::probe;
@@ -36,10 +38,11 @@ impl Source {
     ) -> Result<Extracted, ExtractError> {
         self.kept(input, kept, |source, fault| {
             let functions = Function::of_slice(slice);
-            let sample = |index: usize| samples(&functions[index], &source.positions.points);
-            let slacks = slacks(functions.len(), &sample, input.communicator);
+            let points = &source.positions.points;
+            let value = |index: usize, vertex: usize| functions[index].value(points[vertex]);
+            let slacks = slacks(functions.len(), points.len(), value, input.communicator);
             fault?;
-            source.cut(&slacks, &sample)
+            source.cut(&slacks, value)
         })
     }
 
@@ -52,10 +55,11 @@ impl Source {
     pub fn contour(&mut self, input: &Input, contour: &Contour) -> Result<Extracted, ExtractError> {
         let values = self.update(input).and_then(|()| self.vertex_values(input, &contour.field));
         let known = values.as_deref().unwrap_or_default();
-        let sample = |index: usize| less(known, contour.values[index]);
-        let slacks = slacks(contour.values.len(), &sample, input.communicator);
+        let levels = &contour.values;
+        let value = |index: usize, vertex: usize| known[vertex] - levels[index];
+        let slacks = slacks(levels.len(), known.len(), value, input.communicator);
         values.as_ref().map_err(Clone::clone)?;
-        Ok(self.cut(&slacks, &sample)?.fill(input))
+        Ok(self.cut(&slacks, value)?.fill_once(input))
     }
 
     /// The cells in which a field keeps to a range, whole, with their fields. Collective.
@@ -73,7 +77,7 @@ impl Source {
                 && threshold.max.is_none_or(|max| value <= max)
         };
         let Some(view) = self.field(input, &threshold.field)? else {
-            return Ok(self.whole_cells(Vec::new())?.fill(input));
+            return Ok(self.whole_cells(Vec::new())?.fill_once(input));
         };
         if view.association == Association::Mesh {
             let (field, association) = (view.name.to_owned(), view.association);
@@ -94,7 +98,7 @@ impl Source {
         };
         #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
         let cells = (0..self.cells().len() as u32).filter(is_in).collect();
-        Ok(self.whole_cells(cells)?.fill(input))
+        Ok(self.whole_cells(cells)?.fill_once(input))
     }
 
     /// The part of the mesh on one side of a surface. Cells that are cut become tetrahedra,
@@ -117,28 +121,23 @@ impl Source {
                 let values =
                     self.update(input).and_then(|()| self.vertex_values(input, &field.name));
                 let known = values.as_deref().unwrap_or_default();
-                let sample = |_: usize| less(known, field.value);
-                let slacks = slacks(1, &sample, input.communicator);
+                let value = |_: usize, vertex: usize| known[vertex] - field.value;
+                let slacks = slacks(1, known.len(), value, input.communicator);
                 values.as_ref().map_err(Clone::clone)?;
-                return Ok(self.clipped(&slacks, &sample, clip.invert)?.fill(input));
+                return Ok(self.clipped(&slacks, value, clip.invert)?.fill_once(input));
             }
             ClipBy::Plane(plane) => vec![Function::from(plane)],
             ClipBy::Sphere(sphere) => vec![Function::from(sphere)],
             ClipBy::Box(region) => Function::of_box(region),
         };
         // Inside a sphere its function is below 0.
-        let is_sphere = matches!(clip.by, ClipBy::Sphere(_));
+        let sign = if matches!(clip.by, ClipBy::Sphere(_)) { -1.0 } else { 1.0 };
         self.kept(input, kept, |source, fault| {
-            let sample = |index: usize| {
-                let mut values = samples(&functions[index], &source.positions.points);
-                if is_sphere {
-                    values.iter_mut().for_each(|value| *value = -*value);
-                }
-                values
-            };
-            let slacks = slacks(functions.len(), &sample, input.communicator);
+            let points = &source.positions.points;
+            let value = |index: usize, vertex: usize| sign * functions[index].value(points[vertex]);
+            let slacks = slacks(functions.len(), points.len(), value, input.communicator);
             fault?;
-            source.clipped(&slacks, &sample, clip.invert)
+            source.clipped(&slacks, value, clip.invert)
         })
     }
 
@@ -177,7 +176,7 @@ impl Source {
         }
         let seeds = seeds::of(self, input, &stage.seeds)?;
         let (pattern, times) = streamlines::pattern(self, input, &vectors, &seeds, stage)?;
-        let mut extracted = pattern.fill(input);
+        let mut extracted = pattern.fill_once(input);
         let extract = Arc::make_mut(&mut extracted.extract);
         extract.fields.retain(|field| field.name != streamlines::TIME);
         extract.fields.push(Field {
@@ -211,7 +210,7 @@ impl Source {
             _ => Vec::new(),
         };
         let pattern = glyphs::pattern(self, communicator, vectors.as_deref(), &seeds, stage)?;
-        Ok(pattern.fill(input))
+        Ok(pattern.fill_once(input))
     }
 
     /// The vector that a vertex field has at each vertex.
@@ -280,32 +279,43 @@ impl Source {
         Ok(pattern.fill(input))
     }
 
-    /// Cuts with functions, of which each has its slack.
+    /// Cuts with functions, of which each has its slack; `value` is that of one at a vertex.
     fn cut(
         &self,
         slacks: &[f64],
-        sample: &dyn Fn(usize) -> Samples,
+        value: impl Fn(usize, usize) -> f64,
     ) -> Result<Pattern, ExtractError> {
         let counts = |cell: usize| self.counts(Association::Element, cell);
-        let sample = |index: usize| settled(sample(index), slacks[index]);
+        let value = |index: usize, vertex: usize| settled(value(index, vertex), slacks[index]);
         let points = &self.positions.points;
-        Ok(cut(self.cells(), self.blocks(), points, slacks.len(), &sample, &counts)?.into())
+        Ok(cut(self.cells(), self.blocks(), points, slacks.len(), value, counts)?.into())
     }
 
+    /// Clips with functions, as [`cut`](Self::cut) cuts.
     fn clipped(
         &self,
         slacks: &[f64],
-        sample: &dyn Fn(usize) -> Samples,
+        value: impl Fn(usize, usize) -> f64,
         invert: bool,
     ) -> Result<Pattern, ExtractError> {
-        let samples: Vec<Samples> =
-            (0..).zip(slacks).map(|(index, slack)| settled(sample(index), *slack)).collect();
+        let points = &self.positions.points;
+        let values = |(index, slack): (usize, &f64)| {
+            (0..points.len()).map(|vertex| settled(value(index, vertex), *slack)).collect()
+        };
+        let values: Vec<Vec<f64>> = slacks.iter().enumerate().map(values).collect();
         let numbers = self.whole_mesh().map(|whole| whole.shared.numbers());
-        let mut clipper =
-            Clipper::new(self.cells(), &self.positions.points, &samples, numbers, invert);
-        for cell in 0..self.cells().len() {
-            if self.counts(Association::Element, cell) {
-                clipper.cell(cell)?;
+        let mut clipper = Clipper::new(self.cells(), points, &values, numbers, invert);
+        let sides = |values: &Vec<f64>| Sides::new(values.len(), |vertex| values[vertex]);
+        let functions: Vec<Sides> = values.iter().map(sides).collect();
+        for (block, within) in self.blocks().within(&functions) {
+            if within == (if invert { Within::All } else { Within::None }) {
+                continue;
+            }
+            for cell in block.filter(|&cell| self.counts(Association::Element, cell)) {
+                match within {
+                    Within::Unknown => clipper.cell(cell)?,
+                    Within::All | Within::None => clipper.whole(cell)?,
+                }
             }
         }
         Ok(clipper.finish())
@@ -350,9 +360,13 @@ impl Source {
     }
 
     /// The value of a vertex field that decides, at each vertex.
-    fn vertex_values(&self, input: &Input, name: &str) -> Result<Vec<f64>, ExtractError> {
+    fn vertex_values<'a>(
+        &self,
+        input: &Input<'a>,
+        name: &str,
+    ) -> Result<Cow<'a, [f64]>, ExtractError> {
         match self.field(input, name)? {
-            None => Ok(Vec::new()),
+            None => Ok(Cow::default()),
             Some(view) if view.association == Association::Vertex => self.deciding(input, view),
             Some(view) => {
                 let association = view.association;
@@ -362,8 +376,18 @@ impl Source {
     }
 
     /// The values of a scalar field, and the magnitudes of any other; NaN where it is absent.
-    fn deciding(&self, input: &Input, view: &FieldView) -> Result<Vec<f64>, ExtractError> {
+    fn deciding<'a>(
+        &self,
+        input: &Input<'a>,
+        view: &FieldView<'a>,
+    ) -> Result<Cow<'a, [f64]>, ExtractError> {
         let components = view.values.components();
+        let contiguous = view.values.contiguous().filter(|_| components == 1);
+        let are_finite =
+            |values: &&[f64]| values.iter().fold(true, |all, value| all & value.is_finite());
+        if let Some(values) = contiguous.filter(are_finite) {
+            return Ok(Cow::Borrowed(values));
+        }
         let mut values = Vec::with_capacity(view.values.len());
         for entity in 0..view.values.len() {
             let value = match components {
@@ -383,7 +407,7 @@ impl Source {
             }
             values.push(if value.is_finite() { value } else { f64::NAN });
         }
-        Ok(values)
+        Ok(Cow::Owned(values))
     }
 
     /// Whether a cell is this rank's own, or a vertex one of such a cell.
@@ -394,9 +418,4 @@ impl Source {
             Association::Mesh => false,
         })
     }
-}
-
-/// By how much the values are above a level.
-fn less(values: &[f64], level: f64) -> Samples {
-    values.iter().map(|value| value - level).collect()
 }
