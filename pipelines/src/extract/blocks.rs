@@ -5,26 +5,26 @@ use std::ops::Range;
 
 use tombolo_deform::mesh::Cells;
 
-/// Cells of a block. Where neighbours in the numbering are neighbours in space, so many tetrahedra
-/// have about half as many vertices.
+/// Cells of a block: few enough that a block that is crossed has few cells that are not.
 const CELLS: usize = 16;
 
 /// Blocks of cells that follow one another, each with its vertices as bits. It depends on the cells
-/// alone, and takes one to eight bytes a tetrahedron, the fewer the closer the numbers of neighbours.
+/// alone, and takes three bytes a tetrahedron where neighbours have neighbouring numbers, and fifteen
+/// where the numbers are of no order.
 #[derive(Debug)]
 pub(super) struct Blocks {
     cells: usize,
     /// Where the words of each block end.
     ends: Vec<usize>,
     /// The numbers of the words in which a block has vertices, and its vertices in each.
-    words: Vec<(u32, u64)>,
+    words: Vec<(u32, u32)>,
 }
 
 impl Blocks {
     pub(super) fn new(cells: &Cells, points: usize) -> Self {
-        let (mut ends, mut words): (_, Vec<(u32, u64)>) = (Vec::new(), Vec::new());
+        let (mut ends, mut words): (_, Vec<(u32, u32)>) = (Vec::new(), Vec::new());
         // Where the block that last had vertices of a word keeps them.
-        let mut last = vec![usize::MAX; points.div_ceil(64)];
+        let mut last = vec![usize::MAX; points.div_ceil(32)];
         for block in 0..cells.len().div_ceil(CELLS) {
             let start = words.len();
             for cell in range(block, cells.len()) {
@@ -33,7 +33,7 @@ impl Blocks {
                     let known = &mut last[word];
                     if *known == usize::MAX || *known < start {
                         *known = words.len();
-                        words.push((vertex / 64, 0));
+                        words.push((vertex / 32, 0));
                     }
                     words[*known].1 |= bit;
                 }
@@ -45,7 +45,7 @@ impl Blocks {
     }
 
     /// The cells of each block, and the words that have its vertices.
-    fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[(u32, u64)])> {
+    fn iter(&self) -> impl Iterator<Item = (Range<usize>, &[(u32, u32)])> {
         let mut start = 0;
         self.ends.iter().enumerate().map(move |(block, &end)| {
             let words = &self.words[std::mem::replace(&mut start, end)..end];
@@ -55,7 +55,7 @@ impl Blocks {
 
     /// The cells of the blocks with vertices on both sides.
     pub(super) fn crossed(&self, sides: &Sides) -> impl Iterator<Item = usize> {
-        let is_crossed = |words: &[(u32, u64)]| {
+        let is_crossed = |words: &[(u32, u32)]| {
             let [behind, ahead, _] = sides.of_block(words);
             behind && ahead
         };
@@ -67,7 +67,7 @@ impl Blocks {
         &self,
         functions: &[Sides],
     ) -> impl Iterator<Item = (Range<usize>, Within)> {
-        let within = move |words: &[(u32, u64)]| {
+        let within = move |words: &[(u32, u32)]| {
             let mut within = Within::All;
             for sides in functions {
                 match sides.of_block(words) {
@@ -97,26 +97,26 @@ fn range(block: usize, cells: usize) -> Range<usize> {
 
 /// The word that has a vertex, and its bit there.
 #[inline]
-fn bit(vertex: u32) -> (usize, u64) {
-    ((vertex / 64) as usize, 1 << (vertex % 64))
+fn bit(vertex: u32) -> (usize, u32) {
+    ((vertex / 32) as usize, 1 << (vertex % 32))
 }
 
 /// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is 0
 /// or above, neither where it is NaN.
 pub(super) struct Sides {
-    behind: Vec<u64>,
-    ahead: Vec<u64>,
+    behind: Vec<u32>,
+    ahead: Vec<u32>,
 }
 
 impl Sides {
     pub(super) fn new(vertices: usize, value: impl Fn(usize) -> f64) -> Self {
         let (mut behind, mut ahead) = (Vec::new(), Vec::new());
-        for start in (0..vertices).step_by(64) {
-            let (mut below, mut above) = (0_u64, 0_u64);
-            for vertex in start..vertices.min(start + 64) {
+        for start in (0..vertices).step_by(32) {
+            let (mut below, mut above) = (0_u32, 0_u32);
+            for vertex in start..vertices.min(start + 32) {
                 let value = value(vertex);
-                below |= u64::from(value < 0.0) << (vertex - start);
-                above |= u64::from(value >= 0.0) << (vertex - start);
+                below |= u32::from(value < 0.0) << (vertex - start);
+                above |= u32::from(value >= 0.0) << (vertex - start);
             }
             behind.push(below);
             ahead.push(above);
@@ -148,7 +148,7 @@ impl Sides {
     }
 
     /// Whether a block has vertices behind, ahead, and on neither side.
-    fn of_block(&self, words: &[(u32, u64)]) -> [bool; 3] {
+    fn of_block(&self, words: &[(u32, u32)]) -> [bool; 3] {
         let (mut behind, mut ahead, mut neither) = (0, 0, 0);
         for &(word, vertices) in words {
             let [below, above] = [self.behind[word as usize], self.ahead[word as usize]];
@@ -179,7 +179,7 @@ mod tests {
             let mut vertices: Vec<u32> = words
                 .iter()
                 .flat_map(|&(word, bits)| {
-                    (0..64).filter(move |bit| bits >> bit & 1 == 1).map(move |bit| 64 * word + bit)
+                    (0..32).filter(move |bit| bits >> bit & 1 == 1).map(move |bit| 32 * word + bit)
                 })
                 .collect();
             vertices.sort_unstable();
