@@ -137,9 +137,9 @@ export class Camera {
     if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
   }
 
-  /** A key with the focus on the picture. */
-  key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+  /** A key with the focus on the picture; returns whether it moved the camera. */
+  key(event: KeyboardEvent): boolean {
+    if (event.ctrlKey || event.metaKey || event.altKey) return false;
     const camera = this.renderer.getActiveCamera();
     const actions: Record<string, () => void> = {
       ArrowLeft: () => camera.azimuth(8), ArrowRight: () => camera.azimuth(-8),
@@ -149,10 +149,11 @@ export class Camera {
       X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
     };
     const action = actions[event.key];
-    if (!action) return;
+    if (!action) return false;
     event.preventDefault();
     action();
     camera.orthogonalizeViewUp();
     this.request();
+    return true;
   }
 }

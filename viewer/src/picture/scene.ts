@@ -1,6 +1,7 @@
 /** The picture: a vtk.js render window that draws when something changed, and never waits for the network. */
 import vtkRenderWindow from "@kitware/vtk.js/Rendering/Core/RenderWindow";
 import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
 import { BonesPicture } from "./bones";
 import { makeCanvas } from "./canvas";
@@ -12,6 +13,7 @@ import { bounds } from "./picking";
 import { Camera } from "./camera";
 import type { Box } from "./camera";
 import { mouse } from "./mouse";
+import { Pace } from "./pace";
 import { cornersOf, readProbe, weights } from "./probe";
 import type { Probe, ProbeReading } from "./probe";
 import { Ranges } from "./ranges";
@@ -47,9 +49,10 @@ export class Scene {
   readonly layers = new Map<string, Layer>();
   private readonly window = vtkRenderWindow.newInstance();
   private readonly renderer = vtkRenderer.newInstance();
-  private readonly canvas = makeCanvas().window;
+  private readonly canvas: vtkOpenGLRenderWindow;
+  private readonly pace: Pace;
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
-  readonly camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
+  readonly camera: Camera;
   private readonly ranges = new Ranges();
   private readonly pending = new Map<string, DataFrame>();
   private readonly early = new EarlyFrames();
@@ -68,6 +71,10 @@ export class Scene {
   private recolour = true;
 
   constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
+    const { window, byProcessor } = makeCanvas();
+    this.canvas = window;
+    this.pace = new Pace(byProcessor, () => this.fit());
+    this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
     this.canvas.setContainer(container);
@@ -76,8 +83,12 @@ export class Scene {
     this.interactor.bindEvents(container);
     this.interactor.setInteractorStyle(mouse());
     this.interactor.onRenderEvent(() => this.turned());
+    this.interactor.onStartAnimation(() => this.pace.hold());
+    this.interactor.onEndAnimation(() => this.pace.release());
     container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
-    container.addEventListener("keydown", (event) => this.camera.key(event));
+    container.addEventListener("keydown", (event) => {
+      if (this.camera.key(event)) this.pace.move();
+    });
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
     this.chosen = new ChosenFaces(this.renderer);
@@ -102,6 +113,7 @@ export class Scene {
   /** Shows the shape that an edit would make, with its broken triangles; null takes it away. `drawn` is called once it is seen. */
   setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
     this.ghost.setPoints(points, broken);
+    if (points) this.pace.move();
     this.request(drawn);
   }
 
@@ -314,11 +326,16 @@ export class Scene {
   }
 
   private resize(): void {
-    const box = this.container.getBoundingClientRect();
-    const ratio = window.devicePixelRatio || 1;
-    this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
+    this.fit();
     // As much as there is room for: the page has grown or another panel is open.
     this.camera.refit();
+  }
+
+  /** Gives the canvas its pixels. */
+  private fit(): void {
+    const box = this.container.getBoundingClientRect();
+    const ratio = (window.devicePixelRatio || 1) * this.pace.scale;
+    this.canvas.setSize(Math.max(1, Math.floor(box.width * ratio)), Math.max(1, Math.floor(box.height * ratio)));
     this.request();
   }
 
@@ -346,6 +363,7 @@ export class Scene {
 
   /** Draws all that has come, and says what was drawn. */
   picture(): Promise<Picture> {
+    this.pace.rest();
     return new Promise((resolve) => this.request(() => {
       const cycles = [...this.layers.values()].flatMap((layer) => (layer.frame ? [layer.frame.cycle] : []));
       resolve({ cycle: cycles.length > 0 ? Math.max(...cycles) : null, pixels: this.pixels() });
@@ -359,6 +377,7 @@ export class Scene {
 
   /** Draws all that has come; the canvas holds the picture until the task ends in which `taken` is called. */
   withPicture(taken: (canvas: HTMLCanvasElement) => void): void {
+    this.pace.rest();
     this.request(() => {
       const canvas = this.canvas.getCanvas();
       if (canvas) taken(canvas);
