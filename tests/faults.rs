@@ -154,14 +154,9 @@ fn a_mesh_that_cannot_be_read_is_refused() {
     refused("flow", &small.arguments(&["--headless"]), &["cut.msh"]);
 }
 
-#[test]
-fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
-    let small = unpaused();
-    small.write(
-        "orders.json",
-        &json!([{"at": {"cycle": 3}, "order": {"edits": [
-            {"scale_direction": {"features": ["thraot"], "fixed": ["inlet"], "factors": [1, 1, 0.5]}}]}}]),
-    );
+/// The report of a run that is given an order of this edit at cycle 3.
+fn report_of_order(small: &Small, edit: &Value) -> Value {
+    small.write("orders.json", &json!([{"at": {"cycle": 3}, "order": {"edits": [edit]}}]));
     let arguments = small.arguments(&[
         "--pipelines",
         "@pipelines.json",
@@ -171,7 +166,16 @@ fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
     ]);
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
-    let report = small.read("report.json");
+    small.read("report.json")
+}
+
+#[test]
+fn an_unknown_feature_is_rejected_with_the_near_and_all_names() {
+    let small = unpaused();
+    let report = report_of_order(
+        &small,
+        &json!({"scale_direction": {"features": ["thraot"], "fixed": ["inlet"], "factors": [1, 1, 0.5]}}),
+    );
     let order = &report["orders"][0];
     assert_eq!(order["status"], "rejected", "{report}");
     let reason = order["reason"].as_str().expect("a reason");
@@ -367,21 +371,10 @@ fn garbage_on_the_port_changes_nothing() {
 #[test]
 fn an_order_that_would_break_the_mesh_is_refused_and_the_solver_runs_on() {
     let small = unpaused();
-    small.write(
-        "orders.json",
-        &json!([{"at": {"cycle": 3}, "order": {"edits": [
-            {"scale_direction": {"features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, -0.5]}}]}}]),
+    let report = report_of_order(
+        &small,
+        &json!({"scale_direction": {"features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, -0.5]}}),
     );
-    let arguments = small.arguments(&[
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--headless",
-    ]);
-    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
-    assert!(status.success(), "{text}");
-    let report = small.read("report.json");
     assert_eq!(report["orders"][0]["status"], "rejected", "{report}");
     assert!(report["orders"][0]["cycle_applied"].is_null(), "{report}");
     assert!(small.bytes("out/last.vtu") == undisturbed(), "a rejected order changed the run");

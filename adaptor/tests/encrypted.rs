@@ -91,15 +91,8 @@ fn a_certificate_comes_from_files_whose_key_nobody_else_can_read() {
     let directory = tempfile::tempdir().expect("a directory");
     let files = ["certificate.pem", "key.pem"].map(|name| directory.path().join(name));
     let made = rcgen::generate_simple_self_signed(["localhost".into()]).expect("made");
-    let pem = |label: &str, der: &[u8]| {
-        let text = base64(der);
-        let lines: Vec<&str> =
-            (0..text.len()).step_by(64).map(|at| &text[at..(at + 64).min(text.len())]).collect();
-        format!("-----BEGIN {label}-----\n{}\n-----END {label}-----\n", lines.join("\n"))
-    };
-    std::fs::write(&files[0], pem("CERTIFICATE", made.cert.der())).expect("written");
-    std::fs::write(&files[1], pem("PRIVATE KEY", &made.signing_key.serialize_der()))
-        .expect("written");
+    std::fs::write(&files[0], made.cert.pem()).expect("written");
+    std::fs::write(&files[1], made.signing_key.serialize_pem()).expect("written");
     let stream =
         json!({"listen": "127.0.0.1:0", "tls": {"certificate": files[0], "key": files[1]}});
     let set =
@@ -112,19 +105,6 @@ fn a_certificate_comes_from_files_whose_key_nobody_else_can_read() {
     let half = json!({"listen": "127.0.0.1:0", "tls": {"certificate": files[0]}});
     let refused = settings(half).start().err().expect("refused").to_string();
     assert!(refused.contains("go together"), "{refused}");
-}
-
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for chunk in bytes.chunks(3) {
-        let word = (0..3).fold(0, |word, at| word << 8 | u32::from(*chunk.get(at).unwrap_or(&0)));
-        for digit in 0..4 {
-            let value = (word >> (18 - 6 * digit)) & 63;
-            text.push(if digit <= chunk.len() { DIGITS[value as usize] as char } else { '=' });
-        }
-    }
-    text
 }
 
 #[test]

@@ -25,10 +25,8 @@ fn displacement(vertices: &[u32], seed: f64) -> Value {
     json!({"edits": [{"displacement": {"vertices": vertices, "values": values}}]})
 }
 
-/// A solver takes its commands in at once; those whose turn has not come count all the same.
-#[test]
-fn what_waits_is_limited_in_bytes_also_when_the_solver_has_taken_it() {
-    let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+/// A solver and its driver, whose order `long` is being planned for longer than a test takes.
+fn beside_a_long_plan(settings: Settings) -> (Solver, Viewer) {
     let mut solver = Solver::of_box([24, 24, 24], settings);
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
@@ -37,6 +35,14 @@ fn what_waits_is_limited_in_bytes_also_when_the_solver_has_taken_it() {
     long["schedule"] = json!({"steps": 10_000});
     viewer.send(&json!({"id": "long", "order": long}));
     solver.step_until_told(&mut viewer, "order", has_status("long", "computing"));
+    (solver, viewer)
+}
+
+/// A solver takes its commands in at once; those whose turn has not come count all the same.
+#[test]
+fn what_waits_is_limited_in_bytes_also_when_the_solver_has_taken_it() {
+    let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    let (mut solver, mut viewer) = beside_a_long_plan(settings);
     let text = displacement(&(0..300_000).collect::<Vec<_>>(), 0.0).to_string();
     let fit = PENDING_BYTES.most / text.len();
     assert!((2..8).contains(&fit), "{}", text.len());
@@ -143,14 +149,7 @@ fn a_link_that_falls_behind_gets_coarser_frames_and_the_exact_ones_back() {
 fn an_order_that_waits_too_long_is_rejected() {
     let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
     settings.config.steering.deadline = std::num::NonZeroU32::MIN;
-    let mut solver = Solver::of_box([24, 24, 24], settings);
-    let mut viewer = Viewer::connect(&solver.adaptor);
-    viewer.hello();
-    solver.step();
-    let mut long = squeeze(0.3);
-    long["schedule"] = json!({"steps": 10_000});
-    viewer.send(&json!({"id": "long", "order": long}));
-    solver.step_until_told(&mut viewer, "order", has_status("long", "computing"));
+    let (mut solver, mut viewer) = beside_a_long_plan(settings);
     viewer.send(&json!({"id": "late", "order": squeeze(0.1)}));
     let late = solver.step_until_told(&mut viewer, "order", has_status("late", "rejected"));
     assert!(late["reason"].as_str().unwrap().contains("steering.deadline"), "{late}");

@@ -4,7 +4,6 @@ use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use base64::prelude::{BASE64_STANDARD, Engine};
 use tempfile::TempDir;
 
 use crate::{PATIENCE, Run, project};
@@ -35,8 +34,8 @@ impl Proxy {
         let write = |name: &str, text: &str| {
             std::fs::write(directory.path().join(name), text).expect("a file can be written");
         };
-        write("certificate.pem", &pem("CERTIFICATE", made.cert.der()));
-        write("key.pem", &pem("PRIVATE KEY", &made.signing_key.serialize_der()));
+        write("certificate.pem", &made.cert.pem());
+        write("key.pem", &made.signing_key.serialize_pem());
         let (_, rest) = PAGE.split_once("```nginx\n").expect("the page has a block for nginx");
         let (block, _) = rest.split_once("```").expect("the block ends");
         assert!(block.contains(PATH) && block.contains(SERVICE), "{block}");
@@ -62,14 +61,6 @@ impl Proxy {
         }
         Proxy { _run: run, _directory: directory }
     }
-}
-
-/// The text form of a certificate or a key.
-fn pem(kind: &str, bytes: &[u8]) -> String {
-    let text = BASE64_STANDARD.encode(bytes);
-    let lines: Vec<&str> =
-        text.as_bytes().chunks(64).filter_map(|line| std::str::from_utf8(line).ok()).collect();
-    format!("-----BEGIN {kind}-----\n{}\n-----END {kind}-----\n", lines.join("\n"))
 }
 
 /// Ports of this machine on which nothing listened just now, no two the same.
