@@ -7,7 +7,9 @@
 use std::{
     collections::HashMap,
     error::Error,
-    process::{Child, Command, Stdio},
+    fs::File,
+    io::{Read, Seek},
+    process::{Child, Command},
     time::{Duration, Instant, SystemTime},
 };
 
@@ -152,34 +154,39 @@ impl Run {
 }
 
 /// The process of the viewers, which ends with this.
-struct Viewers(Option<Child>);
+struct Viewers {
+    process: Child,
+    /// What it prints. A pipe would hold it up: nobody reads while the run steps.
+    printed: File,
+}
 
 impl Viewers {
     fn start(link: &str, task: &Task) -> Result<Self, Box<dyn Error>> {
         let mut command = Command::new(std::env::current_exe()?);
         let task = serde_json::to_string(task)?;
+        let printed = tempfile::tempfile()?;
         // Not among its arguments: the link is a secret.
         command.args(["service", "--viewers", &task]).env("TOMBOLO_LINK", link);
-        Ok(Self(Some(command.stdout(Stdio::piped()).spawn()?)))
+        Ok(Self { process: command.stdout(printed.try_clone()?).spawn()?, printed })
     }
 
     fn has_ended(&mut self) -> bool {
-        self.0.as_mut().is_none_or(|child| !matches!(child.try_wait(), Ok(None)))
+        !matches!(self.process.try_wait(), Ok(None))
     }
 
     fn seen(mut self) -> Result<Seen, Box<dyn Error>> {
-        let child = self.0.take().ok_or("the viewers were asked twice")?;
-        let output = child.wait_with_output()?;
-        Ok(serde_json::from_str(peer::answer(&String::from_utf8(output.stdout)?)?)?)
+        self.process.wait()?;
+        let mut printed = String::new();
+        self.printed.rewind()?;
+        self.printed.read_to_string(&mut printed)?;
+        Ok(serde_json::from_str(peer::answer(&printed)?)?)
     }
 }
 
 impl Drop for Viewers {
     fn drop(&mut self) {
-        if let Some(mut child) = self.0.take() {
-            let _ = child.kill();
-            let _ = child.wait();
-        }
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 
