@@ -62,6 +62,8 @@ pub enum Task {
     Large {
         /// How many.
         count: usize,
+        /// The vertices, of the surface.
+        vertices: Vec<u32>,
     },
 }
 
@@ -91,7 +93,9 @@ pub fn run(task: &str) -> Result<(), Box<dyn Error>> {
         Task::Watch { fast, slow, deaf, seconds } => watch(&link, [fast, slow, deaf], seconds)?,
         Task::Latency { count } => orders(&link, (0..count).map(small), 1)?,
         Task::Small { count } => orders(&link, (0..count).map(small), UNDER_WAY)?,
-        Task::Large { count } => orders(&link, (0..count).map(large), UNDER_WAY)?,
+        Task::Large { count, vertices } => {
+            orders(&link, (0..count).map(|index| large(index, &vertices)), UNDER_WAY)?
+        }
     };
     println!("tombolo {}", serde_json::to_string(&seen)?);
     Ok(())
@@ -233,11 +237,10 @@ fn small(index: usize) -> Value {
 }
 
 /// Moves vertices by next to nothing, in 0.94 MB.
-fn large(index: usize) -> Value {
-    let by = |vertex: usize| 1e-12 * (1.0 + (7 * vertex + index) as f64).sin();
-    let vertices: Vec<usize> = (0..2000).collect();
+fn large(index: usize, vertices: &[u32]) -> Value {
+    let by = |number: usize| 1e-12 * (1.0 + (7 * number + index) as f64).sin();
     let values: Vec<[f64; 3]> =
-        vertices.iter().map(|&vertex| [by(vertex), by(vertex + 1), by(vertex + 2)]).collect();
+        (0..vertices.len()).map(|number| [by(number), by(number + 1), by(number + 2)]).collect();
     let edit = json!({"displacement": {"vertices": vertices, "values": values}});
     let copies = 940_000 / edit.to_string().len() + 1;
     // The stack holds so many listed vertices and no more: every tenth order begins anew.
