@@ -130,7 +130,7 @@ def _setter(name):
 
 
 class _Algorithm(VTKPythonAlgorithmBase):
-    """A source or filter. What is wrong is told once, where ParaView tells it."""
+    """A source or filter. What is wrong is told once, where ParaView tells it; it shows nothing then."""
 
     inputs = 1
     output = "vtkPolyData"
@@ -145,13 +145,17 @@ class _Algorithm(VTKPythonAlgorithmBase):
 
     def RequestData(self, request, inputs, outputs):
         kind = vtkTable if self.output == "vtkTable" else vtkPolyData
-        given = [vtkPolyData.GetData(vector, 0) for vector in inputs or []]
+        output, given = kind.GetData(outputs, 0), [vtkPolyData.GetData(vector, 0) for vector in inputs or []]
+        if kind is vtkPolyData and any(data.GetNumberOfPoints() == 0 for data in given):
+            # It has not come yet, or was told where it is wrong.
+            return 1
         try:
-            self.run(kind.GetData(outputs, 0), *given)
+            self.run(output, *given)
+            self._told = None
         except tombolo.TomboloError as error:
+            output.Initialize()
             self.tell(str(error))
-            return 0
-        self._told = None
+        # Of a failure VTK itself would tell too, in words about its executives and at each refresh.
         return 1
 
     def tell(self, text):
