@@ -37,10 +37,19 @@ def _text(name, documentation, default="", domain=""):
     return _documented("StringVectorProperty", name, attributes, documentation, domain)
 
 
-def _number(name, documentation, *default):
+def _number(name, documentation, *default, domain=""):
     values = " ".join(map(str, default))
     attributes = {"number_of_elements": len(default), "default_values": values}
-    return _documented("DoubleVectorProperty", name, attributes, documentation)
+    return _documented("DoubleVectorProperty", name, attributes, documentation, domain)
+
+
+def _point(name, documentation):
+    """A point that begins in the middle of the input, where a person finds it."""
+    domain = (
+        '<BoundsDomain name="range" mode="normal" default_mode="mid"><RequiredProperties>'
+        '<Property name="Input" function="Input"/></RequiredProperties></BoundsDomain>'
+    )
+    return _number(name, documentation, 0.0, 0.0, 0.0, domain=domain)
 
 
 def _count(name, documentation, default, least, most):
@@ -375,8 +384,8 @@ class TomboloSkeleton(_Algorithm):
 @smproxy.filter(name="TomboloDragSkeleton", label="Tombolo Drag Skeleton", support_reload=False)
 @smproperty.xml(
     _FEATURES
-    + _number("At", "Where the node is: the nearest one is dragged.", 0.0, 0.0, 0.0)
-    + _number("To", "Where it is dragged to.", 0.0, 0.0, 0.0)
+    + _point("At", "A point at the node: the nearest one is dragged.")
+    + _point("To", "Where that point is dragged to, and the node by the same way.")
     + _point_widget("Node", "At")
     + _point_widget("Dragged to", "To")
 )
