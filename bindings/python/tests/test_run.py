@@ -242,6 +242,19 @@ def test_one_drives_and_others_watch(solver, run):
         assert watcher.wait_for_view("midplane", timeout=30).cycle >= 0
 
 
+def test_a_closed_run_gives_up_the_wheel_though_it_is_still_held(solver):
+    first = tombolo.connect(solver.link)
+    first.drive()
+    with tombolo.connect(solver.link) as second:
+        second.wait_for(lambda: second.status.driver, 30)
+        with pytest.raises(tombolo.NotDriverError):
+            second.drive()
+        first.close()
+        second.wait_for(lambda: second.status.driver is None, 30)
+        second.drive()
+        assert second.drives and not first.drives
+
+
 def closes_at_once(server):
     server.accept()[0].close()
 
@@ -382,8 +395,10 @@ def test_a_closed_run_and_a_fork_are_told(solver):
     run = tombolo.connect(solver.link)
     run.close()
     run.close()
-    with pytest.raises(tombolo.CallError, match="closed"):
-        run.order(SQUEEZE)
+    assert not run.connected and not run.drives and run.missed == 0 and "token" not in repr(run)
+    for ask in (lambda: run.order(SQUEEZE), lambda: run.stack, lambda: run.surface, lambda: run.on(None, print)):
+        with pytest.raises(tombolo.CallError, match="closed"):
+            ask()
     with tombolo.connect(solver.link) as run:
         child = os.fork()
         if child == 0:
