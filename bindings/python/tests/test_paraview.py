@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import tombolo
-from conftest import FLOW, ends, study, wait
+from conftest import FLOW, TARGET, ends, study, wait
 
 CLIENT = Path(__file__).parents[3] / "clients/paraview"
 SURFACE = {
@@ -231,9 +231,10 @@ def test_why_there_is_no_run_is_told_once_in_plain_vtk(plugin, tmp_path):
 
 def pvpython(*arguments):
     """What ParaView's Python says to a script."""
-    program = os.environ.get("TOMBOLO_PVPYTHON") or shutil.which("pvpython")
+    fetched = shutil.which(TARGET / "third-party/paraview/pvpython")
+    program = os.environ.get("TOMBOLO_PVPYTHON") or fetched or shutil.which("pvpython")
     if program is None:
-        pytest.skip("there is no pvpython: Debian's python3-paraview does not go with the python3-vtk9 of other tests")
+        pytest.skip("there is no pvpython: scripts/fetch-paraview --program")
     package = Path(tombolo.__file__).parents[1]
     environment = os.environ | {"PYTHONPATH": f"{package}:{CLIENT}:{CLIENT / 'debian'}"}
     command = [program, *map(str, arguments)]
