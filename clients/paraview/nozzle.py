@@ -35,6 +35,16 @@ def cycle(data):
     return -1 if array is None else int(array.GetValue(0))
 
 
+def newest(run):
+    """What a run shows from now on: the frame on its way may be of before."""
+    run.UpdatePipeline()
+    shown = servermanager.Fetch(run)
+    for _ in range(2):
+        before = cycle(shown)
+        shown = wait(run, lambda data, before=before: cycle(data) > before)
+    return shown
+
+
 def rows(table):
     """A table of two columns as a dict."""
     return {
@@ -52,8 +62,7 @@ def main():
     given = arguments.parse_args()
 
     run = TomboloRun(Link=given.link, View=given.view)  # noqa: F821
-    shown = wait(run, lambda data: cycle(data) >= 0)
-    began = cycle(shown)
+    began = cycle(wait(run, lambda data: cycle(data) >= 0))
     surface = TomboloSurface(Link=given.link)  # noqa: F821
     wait(surface, lambda data: data.GetNumberOfPoints() > 0)
 
@@ -62,14 +71,7 @@ def main():
         return TomboloScaleDirection(Input=surface, Factors=[1, 1, factor], **handle)  # noqa: F821
 
     def keep():
-        """What is shown from now on, once."""
-        nonlocal shown
-        run.UpdatePipeline()
-        now = cycle(shown)
-        # The frame on its way may be of before.
-        shown = wait(run, lambda data: cycle(data) > now)
-        now = cycle(shown)
-        shown = wait(run, lambda data: cycle(data) > now)
+        shown = newest(run)
         if given.out:
             simple.SaveData(str(given.out / f"shown-{cycle(shown)}.vtp"), proxy=run)
 

@@ -37,10 +37,19 @@ def _text(name, documentation, default="", domain=""):
     return _documented("StringVectorProperty", name, attributes, documentation, domain)
 
 
-def _number(name, documentation, *default):
+def _number(name, documentation, *default, domain=""):
     values = " ".join(map(str, default))
     attributes = {"number_of_elements": len(default), "default_values": values}
-    return _documented("DoubleVectorProperty", name, attributes, documentation)
+    return _documented("DoubleVectorProperty", name, attributes, documentation, domain)
+
+
+def _point(name, documentation):
+    """A point that begins in the middle of the input, where a person finds it."""
+    domain = (
+        '<BoundsDomain name="range" mode="normal" default_mode="mid"><RequiredProperties>'
+        '<Property name="Input" function="Input"/></RequiredProperties></BoundsDomain>'
+    )
+    return _number(name, documentation, 0.0, 0.0, 0.0, domain=domain)
 
 
 def _count(name, documentation, default, least, most):
@@ -130,7 +139,7 @@ def _setter(name):
 
 
 class _Algorithm(VTKPythonAlgorithmBase):
-    """A source or filter. What is wrong is told once, where ParaView tells it."""
+    """A source or filter. What is wrong is told once, where ParaView tells it; it shows nothing then."""
 
     inputs = 1
     output = "vtkPolyData"
@@ -145,13 +154,17 @@ class _Algorithm(VTKPythonAlgorithmBase):
 
     def RequestData(self, request, inputs, outputs):
         kind = vtkTable if self.output == "vtkTable" else vtkPolyData
-        given = [vtkPolyData.GetData(vector, 0) for vector in inputs or []]
+        output, given = kind.GetData(outputs, 0), [vtkPolyData.GetData(vector, 0) for vector in inputs or []]
+        if kind is vtkPolyData and any(data.GetNumberOfPoints() == 0 for data in given):
+            # It has not come yet, or was told where it is wrong.
+            return 1
         try:
-            self.run(kind.GetData(outputs, 0), *given)
+            self.run(output, *given)
+            self._told = None
         except tombolo.TomboloError as error:
+            output.Initialize()
             self.tell(str(error))
-            return 0
-        self._told = None
+        # Of a failure VTK itself would tell too, in words about its executives and at each refresh.
         return 1
 
     def tell(self, text):
@@ -371,8 +384,8 @@ class TomboloSkeleton(_Algorithm):
 @smproxy.filter(name="TomboloDragSkeleton", label="Tombolo Drag Skeleton", support_reload=False)
 @smproperty.xml(
     _FEATURES
-    + _number("At", "Where the node is: the nearest one is dragged.", 0.0, 0.0, 0.0)
-    + _number("To", "Where it is dragged to.", 0.0, 0.0, 0.0)
+    + _point("At", "A point at the node: the nearest one is dragged.")
+    + _point("To", "Where that point is dragged to, and the node by the same way.")
     + _point_widget("Node", "At")
     + _point_widget("Dragged to", "To")
 )

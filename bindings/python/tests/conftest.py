@@ -1,5 +1,6 @@
 """A mesh, a solver that runs on a thread, and what the examples need."""
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -16,7 +17,8 @@ from tombolo import background
 
 PROJECT = Path(__file__).parents[3]
 EXAMPLES = PROJECT / "examples"
-FLOW = Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target"), "debug/flow")
+TARGET = Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target"))
+FLOW = TARGET / "debug/flow"
 
 
 def box(count, dtype=float):
@@ -142,11 +144,22 @@ class Solver:
 
 
 @pytest.fixture
-def solver(tmp_path):
+def begin(tmp_path):
+    """Begins solvers, which end with the test."""
+    with contextlib.ExitStack() as ended:
+
+        def make(*arguments, **settings):
+            running = Solver(*arguments, output=tmp_path, **settings)
+            ended.callback(running.close)
+            return running
+
+        yield make
+
+
+@pytest.fixture
+def solver(begin):
     """A solver under way, which ends with the test."""
-    running = Solver(output=tmp_path)
-    yield running
-    running.close()
+    return begin()
 
 
 @pytest.fixture
@@ -165,6 +178,24 @@ def connections(monkeypatch):
     for connection in known.values():
         if connection.run is not None:
             connection.run.close()
+
+
+def program(*arguments):
+    """What the program `tombolo` of the package did."""
+    command = [sys.executable, "-X", "dev", "-m", "tombolo", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+def features_of_program(file):
+    """The features that the program finds in a file: the name of each, its faces and its vertices."""
+    done = program("features", "--mesh", file, "--json")
+    assert done.returncode == 0, done.stderr
+    return [(it["name"], it["faces"], it["vertices"]) for it in json.loads(done.stdout)["features"]]
+
+
+def features_of(mesh):
+    """The same of a mesh of this or another package."""
+    return [(it["name"], it["faces"], it["vertices"]) for it in tombolo.Shaper(mesh).features]
 
 
 def wait(found, seconds=60):

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 import tombolo
-from conftest import Solver
 
 PAGE = Path(__file__).parents[3] / "docs/python.md"
 
 
-def test_the_tutorial_runs(tmp_path, monkeypatch, capsys):
+def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyvista")
     pytest.importorskip("pandas")
     monkeypatch.chdir(tmp_path)
@@ -22,8 +21,7 @@ def test_the_tutorial_runs(tmp_path, monkeypatch, capsys):
             {"name": "heat", "stages": [{"statistics": {"field": "temperature"}}]},
         ],
     }
-    solver = Solver(configuration, output=tmp_path)
-    names = {"link": solver.link}
+    names = {"link": begin(configuration).link}
     try:
         text = PAGE.read_text()
         snippets = list(re.finditer(r"^```python\n(.*?)^```", text, re.S | re.M))
@@ -33,6 +31,5 @@ def test_the_tutorial_runs(tmp_path, monkeypatch, capsys):
             exec(compile("\n" * line + snippet[1], str(PAGE), "exec"), names)
     finally:
         names["run"].close() if "run" in names else None
-        solver.close()
     assert "0.8 applied" in capsys.readouterr().out
     assert isinstance(names["shape"], tombolo.Shape)

@@ -6,17 +6,7 @@ import sys
 import time
 
 import tombolo
-
-
-def program(*arguments, **settings):
-    return subprocess.run(
-        [sys.executable, "-X", "dev", "-m", "tombolo", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        **settings,
-    )
+from conftest import program
 
 
 def test_the_version_is_that_of_the_package():

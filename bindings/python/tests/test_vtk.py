@@ -1,13 +1,9 @@
 """Data objects of VTK: what is made of views, surfaces and skeletons, and meshes that are made of them."""
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import tombolo
-from conftest import box, ends
+from conftest import box, ends, features_of, features_of_program, program
 
 pytest.importorskip("vtkmodules")
 from tombolo import vtk
@@ -16,22 +12,6 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridRead
 
 POINTS, TETS = box(3)
 FACES = ends(POINTS, TETS)
-
-
-def features_of(mesh):
-    return [(it["name"], it["faces"], it["vertices"]) for it in tombolo.Shaper(mesh).features]
-
-
-def program(*arguments):
-    command = [sys.executable, "-m", "tombolo", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def features_of_program(file):
-    told = json.loads(program("features", "--mesh", file, "--json"))
-    return [(it["name"], it["faces"], it["vertices"]) for it in told["features"]]
 
 
 def read(file):
@@ -134,7 +114,7 @@ def test_features_are_those_of_the_program(tmp_path):
     writer.SetInputData(named)
     writer.Write()
     parts = tmp_path / "parts.vtp"
-    program("features", "--mesh", file, "--out", parts)
+    assert program("features", "--mesh", file, "--out", parts).returncode == 0
     for written in (file, parts):
         assert features_of(read(written)) == features_of_program(written)
     assert features_of(read(parts)) == expected

@@ -30,11 +30,13 @@ from .errors import (
     TomboloError,
     WaitError,
 )
+from .events import Event
 from .mesh import Field, Mesh
 from .monitors import Monitors, MonitorTable
 from .orders import Command, Forecast, Order
-from .run import Event, Parameter, Run, Status, connect
+from .run import Run, connect
 from .shaper import Shape, Shaper, Skeleton
+from .state import Parameter, Status
 from .views import Surface, View
 
 distributed: bool = _DISTRIBUTED

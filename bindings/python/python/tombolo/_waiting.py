@@ -36,5 +36,6 @@ def in_thread(call: Callable[[], Result]) -> Result:
     while not done.wait(1.0):
         pass
     if errors:
-        raise errors[0]
+        # An error in a list of its own traceback would keep alive what it has met.
+        raise errors.pop()
     return results[0]

@@ -7,10 +7,12 @@ from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from .errors import WaitError
-from .orders import Command, Forecast, Order
+from .orders import Command, Edits, Forecast, Order
 
 if TYPE_CHECKING:
-    from .run import Edits, Event, Run, Status
+    from .events import Event
+    from .run import Run
+    from .state import Status
     from .views import Surface, View
 
 __all__ = ["AsyncOrder", "AsyncRun"]
@@ -145,9 +147,10 @@ class AsyncRun:
 
     async def events(self, *kinds: str) -> AsyncIterator[Event]:
         """As `Run.events`."""
-        waiting = self.run._listen()
+        reader = self.run._reader
+        waiting = reader.listen()
         while True:
-            event = await _in_slices(lambda left: self.run._next(waiting, left), None)
+            event = await _in_slices(lambda left: reader.next(waiting, left), None)
             if not kinds or event.kind in kinds:
                 yield event
             if event.kind == "ended":

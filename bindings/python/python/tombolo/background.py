@@ -5,15 +5,12 @@ from __future__ import annotations
 import threading
 import time as clock
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Optional
+from typing import Any, Optional
 
 from .errors import TomboloError
-from .orders import Order
+from .orders import Edits, Order
 from .run import Run, connect
 from .views import Surface
-
-if TYPE_CHECKING:
-    from .run import Edits
 
 __all__ = ["Connection", "Requests", "connection"]
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Optional
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 from .errors import EndedError, RejectedError
 
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from .run import Run
 
 __all__ = ["Command", "Forecast", "Order"]
+
+#: Edits or a whole order, as Python's values or as a file.
+Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
 
 
 class Order:
@@ -31,7 +35,7 @@ class Order:
     @property
     def report(self) -> Mapping[str, Any]:
         """What the run has told of it last, as docs/protocol.md says it; empty before it told anything."""
-        return dict(self._run._orders.get(self.id, {}))
+        return dict(self._run._state.orders.get(self.id, {}))
 
     @property
     def status(self) -> str:
@@ -75,7 +79,7 @@ class Order:
         return self.status in ("applied", "rejected")
 
     def _refused(self) -> Optional[str]:
-        kind, data = self._run._answers.get(self.id, ("", {}))
+        kind, data = self._run._state.answers.get(self.id, ("", {}))
         return str(data["message"]) if kind == "error" else None
 
     def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
@@ -195,7 +199,7 @@ class Command:
     @property
     def cycle(self) -> Optional[int]:
         """The step at which it took effect, where the run tells it."""
-        kind, data = self._run._answers.get(self.id, ("", {}))
+        kind, data = self._run._state.answers.get(self.id, ("", {}))
         cycle: Optional[int] = data.get("cycle") if kind in ("done", "pipelines") else None
         return cycle
 
@@ -205,7 +209,7 @@ class Command:
         return self._answer() is not None
 
     def _answer(self) -> Optional[tuple[str, Any]]:
-        kind, data = self._run._answers.get(self.id, ("", {}))
+        kind, data = self._run._state.answers.get(self.id, ("", {}))
         if kind == "" or (kind == "pipelines" and data.get("status") != "applied"):
             return None
         return kind, data

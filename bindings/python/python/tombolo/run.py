@@ -4,117 +4,38 @@ from __future__ import annotations
 
 import atexit
 import os
-import threading
 import time as clock
 import weakref
-from collections import OrderedDict, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json, _native
-from ._waiting import in_thread, moment_after
-from .errors import CallError, EndedError, LinkError, NotDriverError, RejectedError, TomboloError, WaitError
+from ._reader import Reader
+from ._waiting import in_thread
+from .errors import EndedError, LinkError, NotDriverError, RejectedError, WaitError
+from .events import Callbacks, Event, iterate
 from .monitors import Monitors
-from .orders import Command, Forecast, Order
+from .orders import Command, Edits, Forecast, Order
+from .state import Parameter, State, Status
 from .views import Surface, View
 
 if TYPE_CHECKING:
     from .aio import AsyncRun
     from .jupyter import Plot
 
-__all__ = ["Event", "Parameter", "Run", "Status", "connect"]
+__all__ = ["Run", "connect"]
 
-Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
 Found = TypeVar("Found")
 
-#: How long the thread that reads waits for an event at once, in seconds: so long a run takes to close.
-_SLICE = 0.2
 #: How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
 _WHEEL = 8.0
+#: How long it is asked for at once.
+_SLICE = 0.2
 #: How long a view that nobody knows may take to be announced, in seconds.
 _ANNOUNCED = 2.0
-#: Answers to commands and forecasts that are kept until somebody asks for them.
-_ANSWERS = 4096
-#: Events that wait for one who iterates over them; beyond it the oldest make way.
-_EVENTS = 4096
 
 _RUNS: weakref.WeakSet[Run] = weakref.WeakSet()
-
-
-class Event(NamedTuple):
-    """Something that a run told.
-
-    Attributes
-    ----------
-    kind : str
-        `hello`, `status`, `order`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
-        `note_removed`, `error`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes
-        behind it) or the name of a message that this version does not know.
-    data : dict, View or str
-        The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
-    """
-
-    kind: str
-    data: Any
-
-
-class Status(NamedTuple):
-    """How far the solver is.
-
-    Attributes
-    ----------
-    cycle : int
-        The last step that it told.
-    time : float
-        The simulated time, in the solver's unit.
-    paused, stopped : bool
-        Whether it waits to be resumed; whether it was asked to stop.
-    step_seconds : float or None
-        Seconds that a step takes, where that is known.
-    viewers : int
-        How many clients are connected.
-    driver : str or None
-        The name of the client that steers.
-    quality : dict or None
-        The scaled Jacobian of the mesh: `min`, `mean`, and how many cells are `inverted`.
-    message : dict
-        The whole message.
-    """
-
-    cycle: int
-    time: float
-    paused: bool
-    stopped: bool
-    step_seconds: Optional[float]
-    viewers: int
-    driver: Optional[str]
-    quality: Optional[dict[str, Any]]
-    message: dict[str, Any]
-
-    @classmethod
-    def _of(cls, message: dict[str, Any]) -> Status:
-        return cls(
-            message["cycle"],
-            message["time"],
-            message.get("paused", False),
-            message.get("stopped", False),
-            message.get("step_seconds"),
-            message.get("viewers", 0),
-            message.get("driver"),
-            message.get("quality"),
-            message,
-        )
-
-
-class Parameter(NamedTuple):
-    """A number of the solver that can be steered: its value now, and the least and greatest it may take."""
-
-    value: float
-    minimum: float
-    maximum: float
 
 
 class Run:
@@ -136,199 +57,100 @@ class Run:
 
     def __init__(self, link: str, *, watch: bool, views: bool, attempts: int) -> None:
         self.link = link
-        self.monitors = Monitors()
         self._watch = watch
-        self._process = os.getpid()
-        self._changed = threading.Condition()
-        self._hello: dict[str, Any] = {}
-        self._status: Optional[Status] = None
-        self._stack: dict[str, Any] = {}
-        self._end: Optional[dict[str, Any]] = None
-        self._failure: Optional[TomboloError] = None
-        self._views: dict[str, View] = {}
-        self._orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
-        self._answers: OrderedDict[str, tuple[str, Any]] = OrderedDict()
-        self._listeners: list[weakref.ref[deque[Event]]] = []
-        self._callbacks: list[tuple[Optional[str], Callable[[Event], object]]] = []
-        self._calls: Optional[threading.Thread] = None
-        self._closing = False
-        self._client = in_thread(lambda: _native.Client(link, views, watch, attempts))
-        self._thread = threading.Thread(target=self._read, name="tombolo-run", daemon=True)
-        self._thread.start()
+        self._state = State()
+        self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
+        self._callbacks = Callbacks(self._reader)
         _RUNS.add(self)
-        self.wait_for(lambda: bool(self._hello), 20.0)
-
-    # ---- What the run tells.
-
-    def _read(self) -> None:
-        while not self._closing:
-            try:
-                told = self._client.next(_SLICE)
-            except TomboloError as error:
-                with self._changed:
-                    self._failure = error
-                    self._tell(Event("ended", str(error)))
-                    self._changed.notify_all()
-                return
-            if told is None:
-                continue
-            kind, payload = told
-            data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
-            with self._changed:
-                self._take(kind, data)
-                self._changed.notify_all()
-
-    def _take(self, kind: str, data: Any) -> None:
-        if kind == "frame":
-            data = self._view(data)
-            self._views[data.name] = data
-        elif kind == "taken":
-            self._answer(data, kind, {})
-            return
-        elif kind != "lost":
-            identity = data.get("id")
-            kind, data = next((key, value) for key, value in data.items() if key != "id")
-            if isinstance(data, dict):
-                identity = data.get("id", identity)
-            self._take_message(kind, data, identity)
-        self._tell(Event(kind, data))
-
-    def _take_message(self, kind: str, data: Any, identity: Optional[str]) -> None:
-        if kind == "hello":
-            for report in data.pop("orders", []):
-                self._take_order(report)
-            self._stack = data.get("stack", self._stack)
-            self._hello = data
-        elif kind == "status":
-            self._status = Status._of(data)
-        elif kind == "order":
-            self._take_order(data)
-        elif kind == "stack":
-            self._stack = data
-        elif kind == "monitor":
-            self.monitors._table(data["pipeline"])._append(data)
-        elif kind == "end":
-            self._end = data
-        elif isinstance(identity, str) and kind in ("forecast", "done", "error", "pipelines"):
-            self._answer(identity, kind, data)
-
-    def _take_order(self, report: dict[str, Any]) -> None:
-        known = self._orders.setdefault(report["id"], {})
-        known.update(report)
-        while len(self._orders) > _ANSWERS:
-            self._orders.popitem(last=False)
-
-    def _answer(self, identity: str, kind: str, data: Any) -> None:
-        self._answers[identity] = (kind, data)
-        while len(self._answers) > _ANSWERS:
-            self._answers.popitem(last=False)
-
-    def _view(self, frame: dict[str, Any]) -> View:
-        name = frame["view"]
-        before = self._views.get(name)
-        if "triangles" in frame or before is None:
-            triangles = frame.get("triangles", np.empty((0, 3), np.uint32))
-            lines = frame.get("lines", np.empty((0, 2), np.uint32))
-            features = frame.get("features")
-        else:
-            triangles, lines, features = before.triangles, before.lines, before.features
-        return View(
-            name,
-            frame["cycle"],
-            frame["time"],
-            frame["points"],
-            triangles,
-            lines,
-            features,
-            {field: values for field, _, values in frame["fields"]},
-            {field: association for field, association, _ in frame["fields"]},
-        )
-
-    def _tell(self, event: Event) -> None:
-        self._listeners = [listener for listener in self._listeners if listener() is not None]
-        for listener in self._listeners:
-            waiting = listener()
-            if waiting is not None:
-                waiting.append(event)
+        try:
+            self.wait_for(lambda: bool(self._state.hello), 20.0)
+        except BaseException:
+            self.close()
+            raise
 
     # ---- What is known.
 
     @property
     def status(self) -> Status:
         """How far the solver is, as it was last told; waits for the first status."""
-        if self._status is None:
-            self.wait_for(lambda: self._status is not None, 20.0)
-        status = self._status
+        if self._state.status is None:
+            self.wait_for(lambda: self._state.status is not None, 20.0)
+        status = self._state.status
         assert status is not None
         return status
 
     @property
+    def monitors(self) -> Monitors:
+        """For each pipeline that has monitors a table that grows."""
+        return self._state.monitors
+
+    @property
     def views(self) -> Mapping[str, View]:
         """The newest frame of each live view that has come."""
-        return MappingProxyType(self._views)
+        return MappingProxyType(self._state.views)
 
     @property
     def hello(self) -> Mapping[str, Any]:
         """What there is in the run, as docs/protocol.md says it; the newest that was told."""
-        return MappingProxyType(self._hello)
+        return MappingProxyType(self._state.hello)
 
     @property
     def view_names(self) -> list[str]:
         """The names of the live views."""
-        return [view["name"] for view in self._hello.get("views", [])]
+        return [view["name"] for view in self._state.hello.get("views", [])]
 
     @property
     def features(self) -> list[dict[str, Any]]:
         """The named parts of the surface, each with `name`, `faces`, `vertices` and `bounds`."""
-        return list(self._hello.get("features", []))
+        return list(self._state.hello.get("features", []))
 
     @property
     def fields(self) -> list[dict[str, Any]]:
         """The fields of the steered channel, each with `name`, `association` and `components`."""
-        return list(self._hello.get("fields", []))
+        return list(self._state.hello.get("fields", []))
 
     @property
     def parameters(self) -> dict[str, Parameter]:
         """The numbers of the solver that can be steered."""
-        told = self._hello.get("parameters", [])
+        told = self._state.hello.get("parameters", [])
         return {it["name"]: Parameter(it["value"], it["minimum"], it["maximum"]) for it in told}
 
     @property
     def stack(self) -> list[dict[str, Any]]:
         """The edits that make the present shape, the oldest first, as the run answers now."""
-        edits: list[dict[str, Any]] = _json.loads(self._client.stack())
+        edits: list[dict[str, Any]] = _json.loads(self._reader.client.stack())
         return edits
 
     @property
     def edit_count(self) -> int:
         """How many edits make the present shape, as it was last told: without a wait, unlike `stack`."""
-        return int(self._stack.get("edits", 0))
+        return int(self._state.stack.get("edits", 0))
 
     @property
     def orders(self) -> list[Order]:
         """The orders so far, the oldest first."""
-        with self._changed:
-            return [Order(self, identity) for identity in self._orders]
+        with self._reader.changed:
+            return [Order(self, identity) for identity in self._state.orders]
 
     @property
     def drives(self) -> bool:
         """Whether this client steers."""
-        return self._client.drives
+        return self._reader.drives
 
     @property
     def end(self) -> Optional[dict[str, Any]]:
         """How the run has ended, where it has: `how` (`finished`, `stopped` or `failed`), `cycle` and `time`."""
-        return self._end
+        return self._state.end
 
     @property
     def connected(self) -> bool:
         """Whether anything can still come: the run has not ended, and the connection is not given up."""
-        return self._failure is None and not self._closing
+        return self._reader.failure is None and not self._reader.closed
 
     @property
     def missed(self) -> int:
         """How many events made way for newer ones before they were read."""
-        return self._client.missed
+        return self._reader.missed
 
     @property
     def surface(self) -> Surface:
@@ -339,14 +161,12 @@ class Run:
         LinkError
             Where there is no mesh whose shape could be changed, or not yet.
         """
-        self._check()
-        return Surface(**in_thread(self._client.surface))
+        return Surface(**in_thread(self._reader.client.surface))
 
     @property
     def pipelines(self) -> list[dict[str, Any]]:
         """The pipelines as they are now."""
-        self._check()
-        pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._client.pipelines))
+        pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.pipelines))
         return pipelines
 
     # ---- Waiting.
@@ -380,26 +200,13 @@ class Run:
                 return len(flow) == 50 and np.ptp(flow) < 0.01 * abs(flow.mean())
             run.wait_for(settled)
         """
-        until = moment_after(timeout)
-        with self._changed:
-            while True:
-                self._check()
-                answer = found()
-                if answer:
-                    return answer
-                if self._failure is not None:
-                    raise self._over()
-                left = until - clock.monotonic()
-                if left <= 0:
-                    raise WaitError(f"it did not come within {timeout} seconds")
-                # Short enough for Ctrl-C on every system.
-                self._changed.wait(min(left, 1.0))
+        return self._reader.wait_for(found, timeout)
 
     def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status."""
 
         def found() -> Optional[Status]:
-            return self._status if self._status is not None and self._status.cycle >= cycle else None
+            return self._state.status if self._state.status is not None and self._state.status.cycle >= cycle else None
 
         status = self.wait_for(found, timeout)
         assert status is not None
@@ -409,7 +216,7 @@ class Run:
         """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
 
         def found() -> Optional[View]:
-            view = self._views.get(name)
+            view = self._state.views.get(name)
             return view if view is not None and (after is None or view.cycle > after) else None
 
         if self.view_names and name not in self.view_names:
@@ -427,24 +234,10 @@ class Run:
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""
         try:
-            end = self.wait_for(lambda: self._end, timeout)
+            end = self.wait_for(lambda: self._state.end, timeout)
         except EndedError:
-            end = self._end
+            end = self._state.end
         return end or {"how": "unknown"}
-
-    def _over(self) -> TomboloError:
-        failure = self._failure
-        assert failure is not None
-        if isinstance(failure, EndedError) and self._end is not None:
-            end = self._end
-            return EndedError(f"the run has ended: {end['how']} at cycle {end['cycle']}")
-        return type(failure)(*failure.args)
-
-    def _check(self) -> None:
-        if os.getpid() != self._process:
-            raise CallError("the run was connected before this process was forked; connect here")
-        if self._closing:
-            raise CallError("the run was closed; connect again")
 
     # ---- Events.
 
@@ -468,38 +261,7 @@ class Run:
         WaitError
             None came in time.
         """
-        return self._iterate(self._listen(), kinds, timeout)
-
-    def _listen(self) -> deque[Event]:
-        """What the run tells from now on, until whoever asked lets go of it."""
-        self._check()
-        waiting: deque[Event] = deque(maxlen=_EVENTS)
-        with self._changed:
-            if self._failure is not None:
-                waiting.append(Event("ended", str(self._failure)))
-            self._listeners.append(weakref.ref(waiting))
-        return waiting
-
-    def _next(self, waiting: deque[Event], timeout: Optional[float]) -> Event:
-        self.wait_for(lambda: len(waiting) > 0, timeout)
-        return waiting.popleft()
-
-    def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
-        until = moment_after(timeout)
-        while True:
-            try:
-                event = self._next(waiting, None if timeout is None else max(until - clock.monotonic(), 0.0))
-            except CallError:
-                return
-            except WaitError:
-                raise WaitError(f"none came within {timeout} seconds") from None
-            ended = event.kind == "ended"
-            if not kinds or event.kind in kinds:
-                yield event
-                # Others in between do not make the wait longer.
-                until = moment_after(timeout)
-            if ended:
-                return
+        return iterate(self._reader, self._reader.listen(), kinds, timeout)
 
     def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
         """Have a function called with each event of a kind, or with every one where `kind` is None.
@@ -512,33 +274,7 @@ class Run:
         callable
             Call it to have the function called no more.
         """
-        self._check()
-        entry = (kind, callback)
-        with self._changed:
-            self._callbacks.append(entry)
-            if self._calls is None:
-                events = self.events()
-                self._calls = threading.Thread(target=self._call, args=(events,), name="tombolo-calls", daemon=True)
-                self._calls.start()
-
-        def remove() -> None:
-            with self._changed:
-                if entry in self._callbacks:
-                    self._callbacks.remove(entry)
-
-        return remove
-
-    def _call(self, events: Iterator[Event]) -> None:
-        import traceback
-
-        for event in events:
-            with self._changed:
-                chosen = [callback for kind, callback in self._callbacks if kind in (None, event.kind)]
-            for callback in chosen:
-                try:
-                    callback(event)
-                except Exception:
-                    traceback.print_exc()
+        return self._callbacks.add(kind, callback)
 
     # ---- Steering.
 
@@ -550,15 +286,15 @@ class Run:
         NotDriverError
             Somebody else steers, or this client may only watch.
         """
-        self._check()
+        self._reader.check()
         if self._watch:
             raise NotDriverError("this client only watches: it was connected with watch=True")
         until = clock.monotonic() + timeout
-        while not self._client.drives:
+        while not self.drives:
             try:
-                in_thread(lambda: self._client.drive(_SLICE))
+                in_thread(lambda: self._reader.client.drive(_SLICE))
             except NotDriverError:
-                taken = self._status is not None and self._status.driver is not None
+                taken = self._state.status is not None and self._state.status.driver is not None
                 if taken or clock.monotonic() >= until:
                     raise
 
@@ -603,7 +339,7 @@ class Run:
         settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other}
         text, name = _json.order(edits, settings)
         self.drive()
-        return Order(self, in_thread(lambda: self._client.order(text, name)))
+        return Order(self, in_thread(lambda: self._reader.client.order(text, name)))
 
     def forecast(
         self,
@@ -615,26 +351,23 @@ class Run:
         timeout: Optional[float] = None,
     ) -> Forecast:
         """Ask what an order would come to, were it given now; nothing changes. The parameters are those of `order`."""
-        question = self._ask(edits, {"schedule": schedule, "deform": deform, "guard": guard})
-        kind, data = self.wait_for(lambda: self._answers.get(question), timeout) or ("", {})
+        text, name = _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard})
+        self.drive()
+        question = in_thread(lambda: self._reader.client.forecast(text, name))
+        kind, data = self.wait_for(lambda: self._state.answers.get(question), timeout) or ("", {})
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])
 
-    def _ask(self, edits: Edits, settings: Mapping[str, Any]) -> str:
-        text, name = _json.order(edits, settings)
-        self.drive()
-        return in_thread(lambda: self._client.forecast(text, name))
-
     def undo(self, count: int = 1) -> Order:
         """Take the last orders back; returns the order that does so."""
         self.drive()
-        return Order(self, self._client.undo(count))
+        return Order(self, self._reader.client.undo(count))
 
     def cancel(self, order: Union[Order, str], *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Take back an order that has not begun to move the mesh: it is rejected then."""
         identity = order.id if isinstance(order, Order) else order
-        return self._give(lambda: self._client.cancel(identity), "cancel", wait, timeout)
+        return self._give(lambda: self._reader.client.cancel(identity), "cancel", wait, timeout)
 
     def set(self, parameter: str, value: float, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, within its bounds.
@@ -650,19 +383,19 @@ class Run:
         timeout : float, optional
             Seconds to wait, at most.
         """
-        return self._give(lambda: self._client.set(parameter, float(value)), "set", wait, timeout)
+        return self._give(lambda: self._reader.client.set(parameter, float(value)), "set", wait, timeout)
 
     def pause(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Hold the solver at its next safe point."""
-        return self._give(self._client.pause, "pause", wait, timeout)
+        return self._give(self._reader.client.pause, "pause", wait, timeout)
 
     def resume(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Let the solver go on."""
-        return self._give(self._client.resume, "resume", wait, timeout)
+        return self._give(self._reader.client.resume, "resume", wait, timeout)
 
     def stop(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Ask the solver to end."""
-        return self._give(self._client.stop, "stop", wait, timeout)
+        return self._give(self._reader.client.stop, "stop", wait, timeout)
 
     def change_pipelines(
         self, change: Mapping[str, Any], *, wait: bool = True, timeout: Optional[float] = None
@@ -679,7 +412,7 @@ class Run:
             Seconds to wait, at most.
         """
         text = _json.text(change, "pipelines")
-        return self._give(lambda: self._client.change_pipelines(text), "pipelines", wait, timeout)
+        return self._give(lambda: self._reader.client.change_pipelines(text), "pipelines", wait, timeout)
 
     def _give(self, give: Callable[[], str], task: str, wait: bool, timeout: Optional[float]) -> Command:
         self.drive()
@@ -709,8 +442,7 @@ class Run:
         RejectedError
             This client may not give such a link.
         """
-        self._check()
-        return in_thread(lambda: self._client.link_for(rights, timeout))
+        return in_thread(lambda: self._reader.client.link_for(rights, timeout))
 
     @property
     def aio(self) -> AsyncRun:
@@ -721,13 +453,7 @@ class Run:
 
     def close(self) -> None:
         """Close the connection. The run goes on."""
-        if self._closing or os.getpid() != self._process:
-            return
-        with self._changed:
-            self._closing = True
-            self._changed.notify_all()
-        if threading.current_thread() is not self._thread:
-            self._thread.join(5.0)
+        self._reader.close()
 
     def __enter__(self) -> Run:
         return self
@@ -749,9 +475,9 @@ class Run:
     def __repr__(self) -> str:
         # The link has a secret in it.
         place = self.link.split("?")[0]
-        if self._end is not None:
-            return f"<tombolo.Run {place}, {self._end['how']} at cycle {self._end['cycle']}>"
-        cycle = "no step told yet" if self._status is None else f"cycle {self._status.cycle}"
+        if self._state.end is not None:
+            return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
+        cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
         return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
 
 

@@ -16,7 +16,7 @@ from .orders import Forecast
 from .views import Surface
 
 if TYPE_CHECKING:
-    from .run import Edits
+    from .orders import Edits
 
 __all__ = ["Progress", "Shape", "Shaper", "Skeleton"]
 

@@ -1,0 +1,165 @@
+"""A client of a run, with the thread that reads what the run tells, and the waits for it."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time as clock
+import weakref
+from collections import deque
+from collections.abc import Callable
+from typing import Optional, TypeVar
+
+from . import _json, _native
+from ._waiting import moment_after
+from .errors import CallError, EndedError, TomboloError, WaitError
+from .events import Event
+from .state import State
+
+Found = TypeVar("Found")
+
+#: How long the thread waits for an event at once, in seconds: so long it takes to close.
+_SLICE = 0.2
+#: Events that wait for one who iterates over them; beyond it the oldest make way.
+_EVENTS = 4096
+
+
+class Reader:
+    """Reads what a run tells into a state, and into the queues of those who listen.
+
+    Parameters
+    ----------
+    client : _native.Client
+        The client, which nobody else holds: its connection is closed when it is let go.
+    state : State
+        What is known of the run.
+
+    Attributes
+    ----------
+    changed : threading.Condition
+        It is held while the state changes, and told of it.
+    failure : TomboloError or None
+        Why nothing comes any more.
+    closed : bool
+        Whether it was closed.
+    """
+
+    def __init__(self, client: _native.Client, state: State) -> None:
+        self.changed = threading.Condition()
+        self.failure: Optional[TomboloError] = None
+        self.closed = False
+        self._state = state
+        self._client: Optional[_native.Client] = client
+        self._missed = 0
+        self._process = os.getpid()
+        self._listeners: list[weakref.ref[deque[Event]]] = []
+        self._thread = threading.Thread(target=self._read, args=(client,), name="tombolo-run", daemon=True)
+        self._thread.start()
+
+    def _read(self, client: _native.Client) -> None:
+        while not self.closed:
+            try:
+                told = client.next(_SLICE)
+            except TomboloError as error:
+                with self.changed:
+                    self.failure = error
+                    self._tell(Event("ended", str(error)))
+                    self.changed.notify_all()
+                return
+            if told is None:
+                continue
+            kind, payload = told
+            data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
+            with self.changed:
+                event = self._state.take(kind, data)
+                if event is not None:
+                    self._tell(event)
+                self.changed.notify_all()
+
+    def _tell(self, event: Event) -> None:
+        self._listeners = [listener for listener in self._listeners if listener() is not None]
+        for listener in self._listeners:
+            waiting = listener()
+            if waiting is not None:
+                waiting.append(event)
+
+    # ---- The client.
+
+    @property
+    def client(self) -> _native.Client:
+        """The client, for commands and questions; an error where it was closed, or is of another process."""
+        client = self._client
+        self.check()
+        assert client is not None
+        return client
+
+    @property
+    def drives(self) -> bool:
+        """Whether the client steers."""
+        client = self._client
+        return client is not None and client.drives
+
+    @property
+    def missed(self) -> int:
+        """How many events made way for newer ones before they were read."""
+        client = self._client
+        return self._missed if client is None else client.missed
+
+    def check(self) -> None:
+        """An error where it was closed, or is of another process."""
+        if os.getpid() != self._process:
+            raise CallError("the run was connected before this process was forked; connect here")
+        if self.closed:
+            raise CallError("the run was closed; connect again")
+
+    def close(self) -> None:
+        """Close the connection, and end every wait."""
+        if self.closed or os.getpid() != self._process:
+            return
+        with self.changed:
+            self.closed = True
+            self.changed.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(5.0)
+        # Whoever still has the run must not keep the wheel by it.
+        self._missed, self._client = self.missed, None
+
+    # ---- Waiting.
+
+    def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
+        """As `Run.wait_for`."""
+        until = moment_after(timeout)
+        with self.changed:
+            while True:
+                self.check()
+                answer = found()
+                if answer:
+                    return answer
+                if self.failure is not None:
+                    raise self._over(self.failure)
+                left = until - clock.monotonic()
+                if left <= 0:
+                    raise WaitError(f"it did not come within {timeout} seconds")
+                # Short enough for Ctrl-C on every system.
+                self.changed.wait(min(left, 1.0))
+
+    def _over(self, failure: TomboloError) -> TomboloError:
+        end = self._state.end
+        if isinstance(failure, EndedError) and end is not None:
+            return EndedError(f"the run has ended: {end['how']} at cycle {end['cycle']}")
+        return type(failure)(*failure.args)
+
+    def listen(self) -> deque[Event]:
+        """What the run tells from now on, until whoever asked lets go of it."""
+        self.check()
+        waiting: deque[Event] = deque(maxlen=_EVENTS)
+        with self.changed:
+            if self.failure is not None:
+                waiting.append(Event("ended", str(self.failure)))
+            self._listeners.append(weakref.ref(waiting))
+        return waiting
+
+    def next(self, waiting: deque[Event], timeout: Optional[float]) -> Event:
+        """Wait for the next event of a queue that `listen` has returned."""
+        self.wait_for(lambda: len(waiting) > 0, timeout)
+        return waiting.popleft()

@@ -1,0 +1,95 @@
+"""What a run tells, for those who iterate over it, and for functions that are called with it."""
+
+from __future__ import annotations
+
+import threading
+import time as clock
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional
+
+from ._waiting import moment_after
+from .errors import CallError, WaitError
+
+if TYPE_CHECKING:
+    from ._reader import Reader
+
+__all__ = ["Event"]
+
+
+class Event(NamedTuple):
+    """Something that a run told.
+
+    Attributes
+    ----------
+    kind : str
+        `hello`, `status`, `order`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
+        `note_removed`, `error`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes
+        behind it) or the name of a message that this version does not know.
+    data : dict, View or str
+        The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
+    """
+
+    kind: str
+    data: Any
+
+
+def iterate(
+    reader: Reader, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float] = None
+) -> Iterator[Event]:
+    """The events of some kinds, or all without any, that come into a queue of `Reader.listen`; to the last."""
+    until = moment_after(timeout)
+    while True:
+        try:
+            event = reader.next(waiting, None if timeout is None else max(until - clock.monotonic(), 0.0))
+        except CallError:
+            return
+        except WaitError:
+            raise WaitError(f"none came within {timeout} seconds") from None
+        ended = event.kind == "ended"
+        if not kinds or event.kind in kinds:
+            yield event
+            # Others in between do not make the wait longer.
+            until = moment_after(timeout)
+        if ended:
+            return
+
+
+class Callbacks:
+    """Functions that are called with events, on a thread of their own: there is one from the first function on."""
+
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
+        self._lock = threading.Lock()
+        self._functions: list[tuple[Optional[str], Callable[[Event], object]]] = []
+        self._thread: Optional[threading.Thread] = None
+
+    def add(self, kind: Optional[str], function: Callable[[Event], object]) -> Callable[[], None]:
+        """Have a function called with events of a kind, or with all; returns what ends that."""
+        entry = (kind, function)
+        self._reader.check()
+        with self._lock:
+            self._functions.append(entry)
+            if self._thread is None:
+                waiting = self._reader.listen()
+                self._thread = threading.Thread(target=self._call, args=(waiting,), name="tombolo-calls", daemon=True)
+                self._thread.start()
+
+        def remove() -> None:
+            with self._lock:
+                if entry in self._functions:
+                    self._functions.remove(entry)
+
+        return remove
+
+    def _call(self, waiting: deque[Event]) -> None:
+        import traceback
+
+        for event in iterate(self._reader, waiting, ()):
+            with self._lock:
+                chosen = [function for kind, function in self._functions if kind in (None, event.kind)]
+            for function in chosen:
+                try:
+                    function(event)
+                except Exception:
+                    traceback.print_exc()

@@ -1,0 +1,172 @@
+"""What is known of a run: the newest of all that it has told."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+
+from .events import Event
+from .monitors import Monitors
+from .views import View
+
+__all__ = ["Parameter", "Status"]
+
+#: Answers to commands and forecasts that are kept until somebody asks for them.
+_ANSWERS = 4096
+
+
+class Status(NamedTuple):
+    """How far the solver is.
+
+    Attributes
+    ----------
+    cycle : int
+        The last step that it told.
+    time : float
+        The simulated time, in the solver's unit.
+    paused, stopped : bool
+        Whether it waits to be resumed; whether it was asked to stop.
+    step_seconds : float or None
+        Seconds that a step takes, where that is known.
+    viewers : int
+        How many clients are connected.
+    driver : str or None
+        The name of the client that steers.
+    quality : dict or None
+        The scaled Jacobian of the mesh: `min`, `mean`, and how many cells are `inverted`.
+    message : dict
+        The whole message.
+    """
+
+    cycle: int
+    time: float
+    paused: bool
+    stopped: bool
+    step_seconds: Optional[float]
+    viewers: int
+    driver: Optional[str]
+    quality: Optional[dict[str, Any]]
+    message: dict[str, Any]
+
+    @classmethod
+    def _of(cls, message: dict[str, Any]) -> Status:
+        return cls(
+            message["cycle"],
+            message["time"],
+            message.get("paused", False),
+            message.get("stopped", False),
+            message.get("step_seconds"),
+            message.get("viewers", 0),
+            message.get("driver"),
+            message.get("quality"),
+            message,
+        )
+
+
+class Parameter(NamedTuple):
+    """A number of the solver that can be steered: its value now, and the least and greatest it may take."""
+
+    value: float
+    minimum: float
+    maximum: float
+
+
+class State:
+    """What is known of a run.
+
+    Attributes
+    ----------
+    hello, stack : dict
+        What there is in the run, and the edits of its shape, as docs/protocol.md says it; empty before it was told.
+    status : Status or None
+        How far the solver is.
+    end : dict or None
+        How the run has ended.
+    monitors : Monitors
+        The tables of the monitors.
+    views : dict of str to View
+        The newest frame of each view.
+    orders : dict of str to dict
+        The report of each order.
+    answers : dict of str to (str, dict)
+        The kind of the answer to a question or command, and what it says.
+    """
+
+    def __init__(self) -> None:
+        self.hello: dict[str, Any] = {}
+        self.stack: dict[str, Any] = {}
+        self.status: Optional[Status] = None
+        self.end: Optional[dict[str, Any]] = None
+        self.monitors = Monitors()
+        self.views: dict[str, View] = {}
+        self.orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
+        self.answers: OrderedDict[str, tuple[str, Any]] = OrderedDict()
+
+    def take(self, kind: str, data: Any) -> Optional[Event]:
+        """Take what the run has told; returns the event that it is, None where it is only for whoever has asked."""
+        if kind == "frame":
+            data = self._view(data)
+            self.views[data.name] = data
+        elif kind == "taken":
+            self._answer(data, kind, {})
+            return None
+        elif kind != "lost":
+            identity = data.get("id")
+            kind, data = next((key, value) for key, value in data.items() if key != "id")
+            if isinstance(data, dict):
+                identity = data.get("id", identity)
+            self._take_message(kind, data, identity)
+        return Event(kind, data)
+
+    def _take_message(self, kind: str, data: Any, identity: Optional[str]) -> None:
+        if kind == "hello":
+            for report in data.pop("orders", []):
+                self._take_order(report)
+            self.stack = data.get("stack", self.stack)
+            self.hello = data
+        elif kind == "status":
+            self.status = Status._of(data)
+        elif kind == "order":
+            self._take_order(data)
+        elif kind == "stack":
+            self.stack = data
+        elif kind == "monitor":
+            self.monitors._table(data["pipeline"])._append(data)
+        elif kind == "end":
+            self.end = data
+        elif isinstance(identity, str) and kind in ("forecast", "done", "error", "pipelines"):
+            self._answer(identity, kind, data)
+
+    def _take_order(self, report: dict[str, Any]) -> None:
+        known = self.orders.setdefault(report["id"], {})
+        known.update(report)
+        while len(self.orders) > _ANSWERS:
+            self.orders.popitem(last=False)
+
+    def _answer(self, identity: str, kind: str, data: Any) -> None:
+        self.answers[identity] = (kind, data)
+        while len(self.answers) > _ANSWERS:
+            self.answers.popitem(last=False)
+
+    def _view(self, frame: dict[str, Any]) -> View:
+        name = frame["view"]
+        before = self.views.get(name)
+        if "triangles" in frame or before is None:
+            triangles = frame.get("triangles", np.empty((0, 3), np.uint32))
+            lines = frame.get("lines", np.empty((0, 2), np.uint32))
+            features = frame.get("features")
+        else:
+            triangles, lines, features = before.triangles, before.lines, before.features
+        return View(
+            name,
+            frame["cycle"],
+            frame["time"],
+            frame["points"],
+            triangles,
+            lines,
+            features,
+            {field: values for field, _, values in frame["fields"]},
+            {field: association for field, association, _ in frame["fields"]},
+        )
