@@ -255,23 +255,28 @@ impl Client {
             if self.drives() {
                 return Ok(());
             }
-            let mark = self.id();
-            let message = json!({"id": mark, "drive": {}});
-            self.transmit(mark.clone(), &message, true)?;
+            let id = self.id();
+            self.shared.with(|state| state.asked.insert(id.clone(), None));
+            let message = json!({"id": id, "drive": {}});
             let left = until.saturating_duration_since(Instant::now());
-            let answered = self.shared.wait(left.max(ASK_AGAIN), |state| {
-                let drives = state.hello.as_ref().is_some_and(|h| h.role == Role::Driver);
-                let waits = state.pending.iter().any(|pending| pending.id == mark);
-                match &state.failure {
-                    Some(failure) => Some(Err(failure.clone())),
-                    None => (drives || !waits).then(|| Ok((drives, state.said(&mark)))),
-                }
+            let answered = self.transmit(id.clone(), &message, true).map(|()| {
+                self.shared.wait(left.max(ASK_AGAIN), |state| {
+                    let drives = state.hello.as_ref().is_some_and(|h| h.role == Role::Driver);
+                    let waits = state.pending.iter().any(|pending| pending.id == id);
+                    match &state.failure {
+                        Some(failure) => Some(Err(failure.clone())),
+                        None => (drives || !waits).then_some(Ok(drives)),
+                    }
+                })
             });
-            let (drives, reason) = answered.unwrap_or(Ok((false, None)))?;
-            if drives {
+            let answer = self.shared.with(|state| state.asked.remove(&id)).flatten();
+            if answered?.unwrap_or(Ok(false))? {
                 return Ok(());
             }
-            let reason = reason.unwrap_or_else(|| "nothing was said".into());
+            let reason = match answer {
+                Some(Event::Error(error)) => error.message,
+                _ => "nothing was said".into(),
+            };
             let kept = self.status().is_none_or(|status| status.driver.is_none());
             if !kept || Instant::now() >= until {
                 return Err(ClientError::NotDriver { reason });

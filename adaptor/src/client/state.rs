@@ -199,18 +199,6 @@ impl State {
         }
     }
 
-    /// Takes the error out that answers a command.
-    pub(super) fn said(&mut self, id: &str) -> Option<String> {
-        let answers = |told: &Received| matches!(&told.event, Event::Error(error) if error.id.as_deref() == Some(id));
-        let told =
-            self.texts.iter().position(answers).and_then(|found| self.texts.remove(found))?;
-        self.bytes -= told.text.len();
-        match told.event {
-            Event::Error(error) => Some(error.message),
-            _ => None,
-        }
-    }
-
     /// Takes a frame in.
     pub(super) fn put_frame(&mut self, frame: DecodedFrame) {
         let frame = Received { event: Event::Frame(frame.into()), text: "".into() };
