@@ -4,7 +4,7 @@
  */
 
 /** How long the picture has not moved when it rests, in milliseconds. */
-const REST = 200;
+export const REST = 500;
 
 export class Pace {
   private timer: number | null = null;

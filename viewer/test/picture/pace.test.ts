@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { Pace } from "../../src/picture/pace";
+import { Pace, REST } from "../../src/picture/pace";
 
 beforeEach(() => { vi.useFakeTimers(); });
 afterEach(() => { vi.useRealTimers(); });
@@ -10,7 +10,7 @@ test("a picture that moves is drawn coarsely until it has rested", () => {
   const pace = new Pace(true, changed);
   for (let key = 0; key < 5; key++) {
     pace.move();
-    vi.advanceTimersByTime(150);
+    vi.advanceTimersByTime(REST - 50);
     expect(pace.scale).toBe(0.5);
   }
   expect(changed).toHaveBeenCalledTimes(1);
@@ -25,7 +25,7 @@ test("a hand that holds it still does not make it rest", () => {
   vi.advanceTimersByTime(5000);
   expect(pace.scale).toBe(0.5);
   pace.release();
-  vi.advanceTimersByTime(150);
+  vi.advanceTimersByTime(REST - 50);
   expect(pace.scale).toBe(0.5);
   vi.advanceTimersByTime(100);
   expect(pace.scale).toBe(1);
