@@ -163,7 +163,8 @@ impl Run {
 /// The process of the viewers, which ends with this.
 struct Viewers {
     process: Child,
-    /// What it prints. A pipe would hold it up: nobody reads while the run steps.
+    /// The file that the viewers print into; they would wait at a pipe, which nobody reads while the
+    /// run steps.
     printed: File,
 }
 

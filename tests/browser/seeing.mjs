@@ -45,6 +45,17 @@ const steps = [
     }
     check((await page.evaluate(() => window.tombolo.selection.handle.length)) === 0, "a drag chose a handle");
   }],
+  ["a short drag moves the picture a short way, however finely it is drawn", async () => {
+    const before = await viewer.place("throat");
+    await page.mouse.move(...before);
+    await page.mouse.down({ button: "middle" });
+    await page.mouse.move(before[0] + 4, before[1], { steps: 2 });
+    await page.mouse.up({ button: "middle" });
+    await drawn();
+    const after = await viewer.place("throat");
+    check(after && Math.hypot(after[0] - before[0], after[1] - before[1]) < 20, `a drag of 4 pixels took the throat from ${before} to ${after}`);
+    await page.click('[data-camera="reset"]');
+  }],
   ["the place under the pointer is read, and pinned into the plot", async () => {
     await drawn();
     await page.mouse.move(...(await viewer.place("throat")));

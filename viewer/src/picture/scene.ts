@@ -80,11 +80,10 @@ export class Scene {
     this.canvas.setContainer(container);
     this.interactor.setView(this.canvas);
     this.interactor.initialize();
+    this.pace.follow(container);
     this.interactor.bindEvents(container);
     this.interactor.setInteractorStyle(mouse());
     this.interactor.onRenderEvent(() => this.turned());
-    this.interactor.onStartAnimation(() => this.pace.hold());
-    this.interactor.onEndAnimation(() => this.pace.release());
     container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
     container.addEventListener("keydown", (event) => {
       if (this.camera.key(event)) this.pace.move();

@@ -168,7 +168,7 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
     let mut is_taken = false;
     let begun = Instant::now();
     loop {
-        // What else is told does not make the wait for the place longer.
+        // Other events do not extend the time that the order has to be placed.
         let left = if wait { WAIT } else { ANSWER.saturating_sub(begun.elapsed()) };
         let told = match client.next(left).map_err(failed)? {
             Some(told) => told,
