@@ -67,6 +67,7 @@ pub(super) struct Clipper<'a> {
     invert: bool,
     signs: Vec<Signs>,
     nodes: Vec<Node>,
+    /// The node of each vertex, and its point; `u32::MAX` before they are used.
     of_vertices: Vec<u32>,
     points_of_vertices: Vec<u32>,
     /// Nodes by the two between which they lie, and the function that is 0 there.
@@ -74,7 +75,7 @@ pub(super) struct Clipper<'a> {
     faces: Faces,
     simplices: Vec<[u32; 4]>,
     /// The points of the cell that is taken whole.
-    whole: Vec<u32>,
+    points_of_cell: Vec<u32>,
     cell: u32,
     made: Cells,
     owners: Vec<u32>,
@@ -111,7 +112,7 @@ impl<'a> Clipper<'a> {
             between: ByVertices::default(),
             faces: Faces::default(),
             simplices: Vec::new(),
-            whole: Vec::new(),
+            points_of_cell: Vec::new(),
             cell: 0,
             made: Cells::new(),
             owners: Vec::new(),
@@ -149,7 +150,7 @@ impl<'a> Clipper<'a> {
         if cell_type.dimension() < 2 {
             return Ok(());
         }
-        let mut points = std::mem::take(&mut self.whole);
+        let mut points = std::mem::take(&mut self.points_of_cell);
         if cell_type == CellType::Polyhedron {
             let mut numbered = |face: &Vec<u32>| {
                 self.numbered(face, &mut points);
@@ -161,15 +162,15 @@ impl<'a> Clipper<'a> {
             self.numbered(cells.vertices(cell), &mut points);
             self.made.push(cell_type, &points)?;
         }
-        self.whole = points;
-        self.owners.push(number(cell));
+        self.points_of_cell = points;
+        self.owners.push(as_u32(cell));
         Ok(())
     }
 
     fn decomposed(&mut self, cell: usize, dimension: usize) -> Result<(), MeshError> {
         let numbers = self.numbers;
         let key = |vertex: u32| numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
-        self.cell = number(cell);
+        self.cell = as_u32(cell);
         let mut simplices = std::mem::take(&mut self.simplices);
         simplices.clear();
         self.faces.decompose(self.cells, cell, key, &mut simplices);
@@ -335,7 +336,7 @@ impl<'a> Clipper<'a> {
 
     fn add(&mut self, node: Node) -> u32 {
         self.nodes.push(node);
-        number(self.nodes.len() - 1)
+        as_u32(self.nodes.len() - 1)
     }
 
     /// The node between two others at which the function is 0.
@@ -378,7 +379,7 @@ impl<'a> Clipper<'a> {
     fn number(&mut self, node: u32) -> u32 {
         let number = &mut self.nodes[node as usize].number;
         if *number == u32::MAX {
-            *number = self::number(self.used.len());
+            *number = as_u32(self.used.len());
             self.used.push(node);
         }
         *number
@@ -453,6 +454,6 @@ impl<'a> Clipper<'a> {
     clippy::cast_possible_truncation,
     reason = "cells are numbered with 32 bits, and so are their vertices and what lies between these"
 )]
-fn number(index: usize) -> u32 {
+fn as_u32(index: usize) -> u32 {
     index as u32
 }
