@@ -91,7 +91,10 @@ impl Adaptor {
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));
             self.describe();
-            if let (Ok(Changed { added, replaced, removed }), Some(hub)) = (made, &self.hub) {
+            if let (Ok(changed), Some(hub)) = (made, &self.hub) {
+                let Changed { added, replaced, removed, frames } = changed;
+                // Behind the `hello` that lists their views.
+                frames.into_iter().for_each(|frame| self.pipelines.send(frame, hub));
                 hub.tell(move || {
                     json!({"pipelines": {
                         "id": id, "status": "applied", "cycle": moment.cycle,
