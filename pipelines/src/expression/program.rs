@@ -92,7 +92,7 @@ pub(super) fn evaluate(program: &[Operation], values: &[f64]) -> f64 {
             Operation::Greater => binary!(|a, b| f64::from(u8::from(a > b))),
             Operation::GreaterEqual => binary!(|a, b| f64::from(u8::from(a >= b))),
             Operation::Equal => binary!(|a, b| f64::from(u8::from(a == b))),
-            Operation::NotEqual => binary!(|a, b| f64::from(u8::from(a != b))),
+            Operation::NotEqual => binary!(|a, b| f64::from(u8::from(a < b || a > b))),
             Operation::And => binary!(|a, b| f64::from(u8::from(a != 0.0 && b != 0.0))),
             Operation::Or => binary!(|a, b| f64::from(u8::from(a != 0.0 || b != 0.0))),
             Operation::Minimum => binary!(|a, b| if a.is_nan() || a < b { a } else { b }),

@@ -203,8 +203,8 @@ fn gathered(
         (Association::Vertex, Points::Crossings(crossings), _) => {
             let between = |point: usize, component: usize| {
                 let crossing = &crossings[point];
-                let [a, b] = crossing.edge.map(|vertex| get(vertex as usize, component));
-                crossing.between(a, b)
+                let [a, b] = crossing.edge;
+                crossing.between(get(a as usize, component), get(b as usize, component))
             };
             let read = |point: usize, component: usize| {
                 let [a, b] = crossings[point].edge.map(|vertex| read(vertex as usize, component));

@@ -74,20 +74,10 @@ impl Scene {
                         scene.of_lines.push(value);
                     }
                 }
-                CellType::Pixel => {
-                    scene.push([0, 1, 3, 2].map(|at| vertices[at]), value);
-                }
-                CellType::TriangleStrip => {
-                    for (index, corners) in vertices.windows(3).enumerate() {
-                        let turned = if index % 2 == 0 { [0, 1, 2] } else { [1, 0, 2] };
-                        scene.push(turned.map(|at| corners[at]), value);
-                    }
-                }
-                CellType::Triangle | CellType::Quad | CellType::Polygon => {
-                    scene.push(vertices.iter().copied(), value);
-                }
                 // Those of volumes are not shown: their faces are.
-                _ => {}
+                _ => extract.cells.for_each_polygon(cell, |polygon| {
+                    scene.push(polygon.iter().copied(), value);
+                }),
             }
         }
         scene

@@ -30,8 +30,9 @@ impl Prepared {
             mean = if cells > 0.0 { sums[2] / cells } else { 1.0 };
         }
         progress.values.extend([min, mean, max, inverted]);
-        let wanted = self.wants(QUALITY_FIELD);
-        if let Some(extracted) = progress.extracted.as_mut().filter(|_| wanted) {
+        // A field of the solver of that name stays.
+        let is_added = self.wants(QUALITY_FIELD) && !progress.offers(QUALITY_FIELD);
+        if let Some(extracted) = progress.extracted.as_mut().filter(|_| is_added) {
             extracted.add_element_field(
                 QUALITY_FIELD,
                 &progress.source.scaled_jacobians(progress.channel),
