@@ -261,6 +261,29 @@ def test_a_closed_run_gives_up_the_wheel_though_it_is_still_held(solver):
         assert second.drives and not first.drives
 
 
+def test_a_closed_run_gives_up_the_wheel_though_an_error_holds_its_client():
+    with tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}}) as adaptor:
+        first = tombolo.connect(adaptor.link)
+        first.drive()
+        with pytest.raises(tombolo.LinkError, match="404") as kept:
+            _ = first.surface
+        first.close()
+        with tombolo.connect(adaptor.link) as second:
+            second.drive()
+            assert second.drives and kept.value is not None
+
+
+def test_nothing_is_sent_by_a_client_that_was_closed(solver):
+    run = tombolo.connect(solver.link)
+    client = run._reader.client
+    run.close()
+    run.close()
+    with pytest.raises(tombolo.EndedError):
+        client.pause()
+    with pytest.raises(tombolo.CallError, match="closed"):
+        run.pause()
+
+
 def closes_at_once(server):
     server.accept()[0].close()
 

@@ -30,7 +30,7 @@ class Reader:
     Parameters
     ----------
     client : _native.Client
-        The client, which nobody else holds: its connection is closed when it is let go.
+        The client.
     state : State
         What is known of the run.
 
@@ -121,8 +121,10 @@ class Reader:
             self.changed.notify_all()
         if threading.current_thread() is not self._thread:
             self._thread.join(5.0)
-        # Whoever still has the run must not keep the wheel by it.
-        self._missed, self._client = self.missed, None
+        client, self._missed, self._client = self._client, self.missed, None
+        if client is not None:
+            # Letting go of it would not do: the traceback of an error may hold it, and the wheel with it.
+            client.close()
 
     # ---- Waiting.
 
