@@ -32,6 +32,8 @@ Found = TypeVar("Found")
 _WHEEL = 8.0
 #: How long it is asked for at once.
 _SLICE = 0.2
+#: How links begin.
+_SCHEMES = ("http://", "https://", "unix:")
 #: How long a view that nobody knows may take to be announced, in seconds.
 _ANNOUNCED = 2.0
 
@@ -118,7 +120,7 @@ class Run:
     @property
     def stack(self) -> list[dict[str, Any]]:
         """The edits that make the present shape, the oldest first, as the run answers now."""
-        edits: list[dict[str, Any]] = _json.loads(self._reader.client.stack())
+        edits: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.stack))
         return edits
 
     @property
@@ -219,17 +221,20 @@ class Run:
             view = self._state.views.get(name)
             return view if view is not None and (after is None or view.cycle > after) else None
 
-        if self.view_names and name not in self.view_names:
-            # A view that was added a moment ago is announced a moment later.
-            try:
-                self.wait_for(
-                    lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout)
-                )
-            except WaitError:
-                raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
+        self._announced(name, timeout)
         view = self.wait_for(found, timeout)
         assert view is not None
         return view
+
+    def _announced(self, name: str, timeout: Optional[float] = None) -> None:
+        """An error where there is no view of a name, nor comes to be one."""
+        if not self.view_names or name in self.view_names:
+            return
+        # A view that was added a moment ago is announced a moment later.
+        try:
+            self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
+        except WaitError:
+            raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""
@@ -521,13 +526,13 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
             run.order([{"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]).wait()
     """
     text = os.fspath(link)
-    if "://" not in text and os.path.isfile(text):
+    if "://" not in text and not text.startswith("unix:") and os.path.isfile(text):
         try:
             with open(text, encoding="utf-8") as file:
                 words = file.read(1 << 16).split()
         except (OSError, UnicodeDecodeError) as error:
             raise LinkError(f"{text}: the file cannot be read ({error})") from None
-        links = [word for word in words if word.startswith("http://")]
+        links = [word for word in words if word.startswith(_SCHEMES)]
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
