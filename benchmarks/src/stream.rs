@@ -20,7 +20,7 @@ const SIZES: [(u32, u32); 2] = [(20_000, 1000), (200_000, 200)];
 /// Steps with a pause, and the seconds from one to the next.
 const STEPS: u32 = 100;
 const PAUSE: f64 = 0.05;
-/// How often everybody has his turn.
+/// How often each has its turn.
 const ROUNDS: usize = 3;
 
 /// A stream of one size by one library.
@@ -97,7 +97,7 @@ fn measure(
 
 /// The median of each figure over the rounds.
 fn median(rounds: &[Measured]) -> Result<Measured, Box<dyn Error>> {
-    let first = *rounds.first().ok_or("nobody had a turn")?;
+    let first = *rounds.first().ok_or("there was no round")?;
     let of = |figure: fn(&Measured) -> f64| rounds.iter().map(figure).collect::<Times>().median();
     let to_arrays = rounds.iter().filter_map(|round| round.to_arrays).collect::<Times>().median();
     Ok(Measured {
