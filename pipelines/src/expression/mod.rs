@@ -37,6 +37,15 @@ pub struct Expression {
     program: Vec<Operation>,
 }
 
+/// A name that a formula uses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UsedName {
+    /// The name.
+    pub name: String,
+    /// The column of its first character where it stands first, from 1.
+    pub column: usize,
+}
+
 /// Why a formula was refused, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("column {column} of the formula: {message}{}", suggestion.as_deref().map_or_else(String::new, |name| format!("; did you mean `{name}`?")))]
@@ -87,17 +96,14 @@ impl Expression {
     /// As [`parse`](Self::parse).
     pub fn parse_open(text: &str) -> Result<(Self, Vec<String>), ExpressionError> {
         let (program, names) = parse_open(text, Kind::Number)?;
-        Ok((Self { program }, names.into_iter().map(|(name, _)| name).collect()))
+        Ok((Self { program }, names.into_iter().map(|used| used.name).collect()))
     }
 
-    /// Parses a condition that may use any name, and returns the names that it uses, each with the
-    /// column at which it stands first.
+    /// Parses a condition that may use any name, and returns the names that it uses.
     ///
     /// # Errors
     /// As [`parse`](Self::parse).
-    pub fn parse_open_condition(
-        text: &str,
-    ) -> Result<(Self, Vec<(String, usize)>), ExpressionError> {
+    pub fn parse_open_condition(text: &str) -> Result<(Self, Vec<UsedName>), ExpressionError> {
         let (program, names) = parse_open(text, Kind::Condition)?;
         Ok((Self { program }, names))
     }

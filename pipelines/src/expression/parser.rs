@@ -2,8 +2,8 @@
 
 use tombolo_deform::names::nearest;
 
-use super::ExpressionError;
 use super::program::{Operation, STACK, UNARY};
+use super::{ExpressionError, UsedName};
 use crate::limits::{FORMULA, FORMULA_DEPTH};
 
 /// The functions of more than one number.
@@ -26,11 +26,11 @@ pub(super) fn parse(
 }
 
 /// The operations of a formula that may use any name, and the names that it uses: their positions
-/// are those of the values. Each has the column at which it stands first.
+/// are those of the values.
 pub(super) fn parse_open(
     text: &str,
     expected: Kind,
-) -> Result<(Vec<Operation>, Vec<(String, usize)>), ExpressionError> {
+) -> Result<(Vec<Operation>, Vec<UsedName>), ExpressionError> {
     let parser = Parser { found_names: Some(Vec::new()), ..Parser::new(text, &[]) };
     let parser = parsed(parser, expected)?;
     Ok((parser.program, parser.found_names.unwrap_or_default()))
@@ -56,8 +56,8 @@ struct Parser<'a> {
     text: &'a str,
     at: usize,
     names: &'a [&'a str],
-    /// The names found so far and their columns, where any may be used.
-    found_names: Option<Vec<(String, usize)>>,
+    /// The names found so far, where any may be used.
+    found_names: Option<Vec<UsedName>>,
     program: Vec<Operation>,
     depth: usize,
     stack: usize,
@@ -288,8 +288,8 @@ impl<'a> Parser<'a> {
         } else if name == "pi" {
             self.push(Operation::Constant(std::f64::consts::PI), 0, start)?;
         } else if let Some(mut found) = self.found_names.take() {
-            let index = found.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
-                found.push((name.to_owned(), self.column(start)));
+            let index = found.iter().position(|known| known.name == name).unwrap_or_else(|| {
+                found.push(UsedName { name: name.to_owned(), column: self.column(start) });
                 found.len() - 1
             });
             self.found_names = Some(found);

@@ -8,7 +8,7 @@ use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
 use super::{Csv, Log, Parameter, Problem, Problems, nearest};
-use crate::expression::Expression;
+use crate::expression::{Expression, UsedName};
 
 /// A number that a pipeline measures.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -234,7 +234,7 @@ impl Condition {
             vec![Problem::new(message).suggest(error.suggestion.as_deref())]
         })?;
         let (mut slots, mut problems) = (Vec::new(), Vec::new());
-        for (name, column) in &names {
+        for UsedName { name, column } in &names {
             match scope.find(name) {
                 Ok(slot) => slots.push(slot),
                 Err(problem) => {
