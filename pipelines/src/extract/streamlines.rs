@@ -383,17 +383,15 @@ pub(super) fn pattern(
 ) -> Result<(Pattern, Vec<f64>), ExtractError> {
     let communicator = input.communicator;
     let points = &source.positions.points;
-    let [lower, upper] = Bounds::around(points.iter().copied()).corners();
-    let fastest = vectors.iter().map(|vector| length(*vector));
-    let fastest = fastest.filter(|speed| speed.is_finite()).fold(0.0, f64::max);
-    let mut extremes = [-lower[0], -lower[1], -lower[2], upper[0], upper[1], upper[2], fastest];
-    communicator.reduce(Reduction::Maximum, &mut extremes);
-    let across = [0, 1, 2].map(|axis| extremes[axis] + extremes[axis + 3]);
+    let bounds = Bounds::around(points.iter().copied()).of_ranks(communicator);
+    let speeds = vectors.iter().map(|vector| length(*vector));
+    let mut fastest = [speeds.filter(|speed| speed.is_finite()).fold(0.0, f64::max)];
+    communicator.reduce(Reduction::Maximum, &mut fastest);
     let settings = Settings {
-        max_length: stage.max_length.unwrap_or(5.0 * length(across)),
+        max_length: stage.max_length.unwrap_or(5.0 * length(bounds.extent())),
         max_steps: u32::try_from(stage.max_steps).unwrap_or(u32::MAX),
         error: stage.error,
-        least_speed: 1e-12 * extremes[6],
+        least_speed: 1e-12 * fastest[0],
         points: limit,
     };
     let finder = Finder::new(source, ProbeMethod::Interpolated);
