@@ -7,7 +7,10 @@ use std::path::Path;
 use common::{Solver, Viewer, bits, config, squeeze};
 use fastrand::Rng;
 use serde_json::{Value, json};
-use tombolo::{OrderStatus, Settings, pipelines::language::parse_journal};
+use tombolo::{
+    OrderStatus, Settings,
+    pipelines::language::{parse_journal, parse_orders},
+};
 
 /// A pipeline gives orders too, and viewers look on.
 const CONFIGURATION: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": [
@@ -227,6 +230,57 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
     let again = replay(&journal, trace.len());
     assert!(again == trace, "the replay differs");
+    // As a file of orders it is for a run in which nothing waits that could be replaced.
+    let output = tempfile::tempdir().unwrap();
+    let orders = parse_orders(&journal, "journal.jsonl").unwrap();
+    let mut other = Solver::new(Settings { orders, ..settings(output.path()) });
+    other.steps(trace.len() as u64);
+    let orders = other.finish().orders;
+    for id in ["first", "better", "third"] {
+        let order = orders.iter().find(|order| order.id == id).unwrap();
+        assert_ne!(order.status, OrderStatus::Rejected, "{order:?}");
+    }
+}
+
+/// In the run and in its replay, what has no name of its own is counted from `o1`.
+#[test]
+fn a_command_of_a_replay_has_its_name_whatever_is_said_before_it() {
+    const CONFIGURATION: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"},
+        "journal": "journal.jsonl", "pipelines": []}"#;
+    let settings = |output: &Path| Settings {
+        config: config(CONFIGURATION),
+        output: output.into(),
+        ..Settings::default()
+    };
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(settings(output.path()));
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.steps(50);
+    viewer.send(&json!({"order": squeeze(0.2)}));
+    let order = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    assert_eq!(order["id"], "o1");
+    let (cycles, mesh) = (solver.cycle, bits(&solver.mesh));
+    solver.finish();
+    let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+    let again = tempfile::tempdir().unwrap();
+    let replay = Some(parse_journal(&journal, "journal.jsonl").unwrap());
+    let mut replayed = Solver::new(Settings { replay, ..settings(again.path()) });
+    let mut viewer = Viewer::connect(&replayed.adaptor);
+    viewer.hello();
+    viewer.send(&json!({"pause": {}}));
+    viewer.send(&json!({"resume": {}}));
+    // A refused message is answered too: what was sent before it has come in.
+    viewer.send(&json!({"id": "o1", "resume": {}}));
+    let error = viewer.wait_for("error", |error| error["id"] == "o1");
+    assert!(error["message"].as_str().unwrap().contains("another command"), "{error}");
+    replayed.step();
+    let done = viewer.wait_for("done", |_| true);
+    assert_eq!(done["id"], "o2");
+    replayed.steps(cycles - 1);
+    assert!(bits(&replayed.mesh) == mesh, "{journal}");
+    let orders = replayed.finish().orders;
+    assert!(orders.len() == 1 && orders[0].id == "o1", "{orders:?}");
 }
 
 #[test]

@@ -82,6 +82,12 @@ impl Log {
         lock(&self.state).reserve(id);
     }
 
+    /// Keeps the names of commands that were given beforehand for them.
+    pub(crate) fn expect<'a>(&self, ids: impl Iterator<Item = &'a str>) {
+        let mut state = lock(&self.state);
+        ids.for_each(|id| state.expect(id));
+    }
+
     /// Takes a command in that an earlier run has accepted, under its name.
     pub(crate) fn accept_again(
         &self,
@@ -109,7 +115,13 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) -> Result<String, String> {
-        let named = lock(&self.state).name(wanted, None)?;
+        let named = {
+            let mut state = lock(&self.state);
+            if let (Source::File, Some(id)) = (source, &wanted) {
+                state.has_come(id);
+            }
+            state.name(wanted, None)?
+        };
         let (Named::New(id) | Named::Again(id)) = named;
         self.journal.write(&accepted(&id, source, command, moment));
         self.admit(&id, command, moment);
