@@ -176,6 +176,7 @@ impl Adaptor {
             changes,
             waiting_changes: Vec::new(),
             changed: 0,
+            saved: None,
             is_spared: AtomicBool::new(false),
             watch,
             forecaster,

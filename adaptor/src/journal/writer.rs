@@ -133,27 +133,41 @@ impl Journal {
     /// Has a line about the run written, and returns once it and all before it are on disk: after
     /// two seconds at the latest, and at once while nothing can be written.
     pub(crate) fn note_and_wait(&self, note: &JournalNote) {
-        let Some(shared) = &self.shared else { return };
+        if !self.write_and_wait(line(note)) {
+            self.note(note);
+        }
+    }
+
+    /// Returns once all lines so far are on disk and whoever waits for one of them has heard of it:
+    /// after two seconds at the latest, and at once while nothing can be written.
+    pub(crate) fn wait(&self) {
+        self.write_and_wait(Vec::new());
+    }
+
+    /// Has a text written and waits; `false` where that would be in vain.
+    fn write_and_wait(&self, text: Vec<u8>) -> bool {
+        let Some(shared) = &self.shared else { return true };
         let (done, written) = std::sync::mpsc::channel();
         let mut state = lock(&shared.state);
         if state.trouble.is_some() || state.is_closed {
-            drop(state);
-            return self.note(note);
+            return false;
         }
         let settle: Settle = Box::new(move |_| {
             let _ = done.send(());
         });
         // Should it be written after all, it needs no line that takes it back.
-        state.push(Line {
-            text: line(note),
-            asked: Some((settle, Vec::new())),
-            is_withdrawn: false,
-        });
+        state.push(Line { text, asked: Some((settle, Vec::new())), is_withdrawn: false });
         shared.changed.notify_all();
         drop(state);
         if written.recv_timeout(END).is_err() {
             log::warn!("the disk does not answer: the journal's last lines are not on it yet");
         }
+        true
+    }
+
+    /// Whether there is a journal.
+    pub(crate) fn is_kept(&self) -> bool {
+        self.shared.is_some()
     }
 
     fn push(&self, text: Vec<u8>) {
