@@ -2,6 +2,7 @@
 //! handed.
 
 use std::collections::HashMap;
+use std::num::NonZeroU64;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -114,6 +115,10 @@ pub struct ViewerNote {
     pub may_drive: bool,
     /// The action.
     pub did: ViewerMove,
+    /// How many lines about viewers with the same rights were left out before this one, because there
+    /// were too many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<NonZeroU64>,
 }
 
 /// An action of a viewer.
