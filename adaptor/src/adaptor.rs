@@ -61,6 +61,9 @@ use crate::{
     watch::Watch,
 };
 
+/// What is told of a command whose turn did not come.
+const TOO_LATE: &str = "the run ended before its turn came";
+
 /// Links a solver to its viewers and to the orders that change its shape.
 ///
 /// See the [crate's page](crate) for a whole solver.
@@ -89,6 +92,9 @@ pub struct Adaptor {
     waiting_changes: Vec<changing::WaitingChange>,
     /// How many changes of pipelines were made.
     changed: u64,
+    /// How many of the commands in the queue are in the checkpoint that was made since the last call;
+    /// `None` where none was made.
+    saved: Option<usize>,
     /// Whether the solver was told that the step to come does not look at its mesh and fields.
     is_spared: AtomicBool,
     /// Looks at the configuration's file.
@@ -290,7 +296,9 @@ impl Adaptor {
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         self.has_begun = true;
-        let moved = match self.meet(moment, fault, entered)? {
+        let met = self.meet(moment, fault, entered)?;
+        self.saved = None;
+        let moved = match met {
             Some((called, outside)) => {
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;
@@ -381,17 +389,10 @@ impl Adaptor {
     pub fn finalize(mut self) -> Result<Report, FinalizeError> {
         let _alarm = Alarm::among(&self.communicator);
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
-            steerer.end(self.moment);
+            steerer.end(self.moment, self.saved.is_some());
         }
-        for Received { id, command, source, .. } in self.queue.take() {
-            let reason = "the run ended before its turn came";
-            match command {
-                Command::Order(_) => self.log.reject(&id, self.moment, &reason.into()),
-                // It ends, as was asked.
-                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
-                _ => self.log.settle(&id, &source, self.moment, Err(reason.into())),
-            }
-        }
+        self.end_changes();
+        self.end_queue();
         self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         self.mesh = SteeredMesh::Unknown;
         let asked = self.pipelines.end(self.moment, self.hub.as_ref());
@@ -402,6 +403,9 @@ impl Adaptor {
         }
         self.server = None;
         self.recorder = None;
+        // What the server has taken in until now has an outcome too.
+        self.log.wait();
+        self.end_queue();
         self.log.end(self.moment);
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
@@ -422,6 +426,44 @@ impl Adaptor {
                 first: first.clone(),
                 report: Box::new(report),
             }),
+        }
+    }
+
+    /// Tells of all commands in the queue that the run ended before their turn came.
+    fn end_queue(&mut self) {
+        for Received { id, command, source, .. } in self.queue.take() {
+            // The journal has what came after the checkpoint.
+            let goes_on = match &mut self.saved {
+                None => false,
+                Some(0) => self.log.has_journal(),
+                Some(left) => {
+                    *left -= 1;
+                    true
+                }
+            };
+            match command {
+                Command::Order(_) if goes_on => self.log.leave_open(&id),
+                Command::Order(_) => self.log.reject(&id, self.moment, &TOO_LATE.into()),
+                // It ends, as was asked.
+                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
+                // What they were for goes with this run.
+                Command::Pause {} | Command::Resume {} | Command::Cancel(_) => {
+                    self.end_command(&id, &source, false);
+                }
+                Command::Parameter(_) | Command::Pipelines(_) => {
+                    self.end_command(&id, &source, goes_on);
+                }
+            }
+        }
+    }
+
+    /// Tells of a command that is no order that the run ended before its turn came; whether a run
+    /// that goes on from the checkpoint carries it out.
+    fn end_command(&self, id: &str, source: &Source, goes_on: bool) {
+        if goes_on {
+            self.log.leave_command_open(id, source, self.moment);
+        } else {
+            self.log.settle(id, source, self.moment, Err(TOO_LATE.into()));
         }
     }
 

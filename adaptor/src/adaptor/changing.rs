@@ -83,6 +83,13 @@ impl Adaptor {
         self.waiting_changes.push(WaitingChange { id, source, change, _reservation: reservation });
     }
 
+    /// Tells that the run ends before the changes that all ranks were told of are made.
+    pub(super) fn end_changes(&mut self) {
+        for WaitingChange { id, source, .. } in std::mem::take(&mut self.waiting_changes) {
+            self.end_command(&id, &source, self.saved.is_some());
+        }
+    }
+
     /// Makes the changes that all ranks were told of. All have lent the whole mesh with its fields.
     /// Collective.
     pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {

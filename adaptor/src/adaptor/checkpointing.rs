@@ -35,6 +35,7 @@ impl Adaptor {
         self.log.note_and_wait(&JournalNote::Checkpoint(note));
         let changes = self.waiting_changes.iter().map(super::changing::WaitingChange::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
+        let before = waiting.len();
         self.queue.look(|received| {
             waiting.push(SavedCommand {
                 id: received.id.clone(),
@@ -42,6 +43,7 @@ impl Adaptor {
                 command: received.command.clone(),
             });
         });
+        self.saved = Some(waiting.len() - before);
         let mut pipelines = Writer::default();
         self.pipelines.save(&mut pipelines);
         let (mesh, points) = match (&self.mesh, self.lent.reference()) {

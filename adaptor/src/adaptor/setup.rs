@@ -106,6 +106,7 @@ impl Adaptor {
             log.resume(checkpoint.run.known.clone());
             pipelines.restore(&checkpoint.pipelines)?;
         }
+        log.expect(orders.iter().filter_map(|timed| timed.id.as_deref()));
         let changes = Arc::new(Changes::new(
             Arc::clone(&config),
             known.clone(),
@@ -175,6 +176,7 @@ impl Adaptor {
             changes,
             waiting_changes: Vec::new(),
             changed: 0,
+            saved: None,
             is_spared: AtomicBool::new(false),
             watch,
             forecaster,

@@ -51,6 +51,7 @@ mod text;
 mod tls;
 mod together;
 mod viewer_files;
+mod viewer_lines;
 mod wheel;
 
 use std::{
@@ -83,6 +84,7 @@ use socket::{Listening, Place, Socket};
 use tls::Identity;
 use tokio_rustls::TlsAcceptor;
 use viewer_files::ViewerFiles;
+use viewer_lines::ViewerLines;
 
 /// How often a viewer is asked whether it is still there.
 const PING_PERIOD: Duration = Duration::from_secs(10);
@@ -189,6 +191,7 @@ struct Shared {
     commands: Arc<dyn CommandSink>,
     files: ViewerFiles,
     limits: StreamLimits,
+    lines: Arc<ViewerLines>,
     /// The recording that is served in place of a run.
     playback: Option<Arc<playback::Shown>>,
 }
@@ -253,6 +256,7 @@ impl Server {
             commands,
             files: ViewerFiles::find(),
             limits: settings.limits,
+            lines: Arc::default(),
             playback,
         };
         let (acceptor, fingerprint) =
