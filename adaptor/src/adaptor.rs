@@ -286,7 +286,7 @@ impl Adaptor {
         }
         self.timing.cycles += 1;
         let moment = step.moment();
-        self.clock.set(moment.cycle, moment.time);
+        self.clock.set(moment);
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         self.has_begun = true;

@@ -99,7 +99,7 @@ impl Adaptor {
         let log = Arc::new(Log::new(journal, hub.clone()));
         log.resume_notes(notes);
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
-        clock.set(moment.cycle, moment.time);
+        clock.set(moment);
         let config = Arc::new(config);
         let mut pipelines = Pipelines::new(&config, Arc::clone(&communicator), &output)?;
         if let Some(Continued { checkpoint, .. }) = &continued {

@@ -11,7 +11,7 @@ use axum::{
 use serde_json::Value;
 
 use super::{Shared, credentials::Holder, hub::Hub};
-use crate::lock::lock;
+use crate::{lock::lock, step::Moment};
 
 const TEXT: [(HeaderName, &str); 1] =
     [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
@@ -58,7 +58,7 @@ impl Metrics {
 impl Hub {
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
     fn measure(&self, metrics: &mut Metrics) {
-        let (cycle, time) = self.clock.get();
+        let Moment { cycle, time } = self.clock.get();
         metrics.one("tombolo_cycle", "counter", "The step of the last call.", cycle as f64);
         metrics.one("tombolo_time", "gauge", "The simulated time then.", time);
         let counts = self.counts();
