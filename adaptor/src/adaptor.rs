@@ -125,6 +125,8 @@ struct Meetings {
     calls: u64,
     /// The fault of this rank since the last meeting.
     fault: Option<ExecuteError>,
+    /// The cycle of the last, where they do not come together at every call.
+    last: Option<u64>,
 }
 
 /// The part of `hello` that does not change from order to order.
@@ -299,6 +301,9 @@ impl Adaptor {
                     // therefore counts from the next step on.
                     self.pipelines.tell(outside);
                 }
+                if self.skips_meetings() {
+                    self.note_meeting(moment.cycle);
+                }
                 moved
             }
             None => false,
@@ -459,6 +464,19 @@ impl Adaptor {
             return Ok(None);
         }
         meeting::meet(&*self.communicator, moment, fault, called, outside).map(Some)
+    }
+
+    /// Whether there are calls at which the ranks do not come together.
+    #[inline]
+    fn skips_meetings(&self) -> bool {
+        self.communicator.size() > 1 && self.config.steering.poll_steps.get() > 1
+    }
+
+    /// Notes the cycle of a meeting, which all ranks were at: what falls due behind it and before the
+    /// next runs at the next. What a step between them says is of one rank alone.
+    fn note_meeting(&mut self, cycle: u64) {
+        self.meetings.last = Some(cycle);
+        self.pipelines.set_met(cycle);
     }
 
     /// Whether there is nothing to do in this call.

@@ -63,6 +63,7 @@ impl Adaptor {
             has_begun: self.has_begun,
             cycle,
             time,
+            met: self.meetings.last,
             parameters: parameters.collect(),
             pipelines: [self.given.pipelines.clone(), self.config.pipelines.clone()],
             timed: (self.given.orders, self.timed.left().to_vec()),

@@ -142,6 +142,7 @@ impl Adaptor {
             }
             _ => None,
         };
+        let met = continued.as_ref().and_then(|continued| continued.checkpoint.run.met);
         let watch = match file {
             Some(file) if config.watch && first && !is_replay => Some(
                 Watch::start(&file, known, Arc::clone(&changes), hub.clone())
@@ -155,7 +156,7 @@ impl Adaptor {
             }
             _ => None,
         };
-        let adaptor = Self {
+        let mut adaptor = Self {
             defaults,
             pipelines,
             config,
@@ -193,6 +194,9 @@ impl Adaptor {
             meetings: Meetings::default(),
             timing: Timing::default(),
         };
+        if let Some(cycle) = met.filter(|_| adaptor.skips_meetings()) {
+            adaptor.note_meeting(cycle);
+        }
         adaptor.announce_resumed();
         adaptor.describe();
         adaptor.tell_conditions();
