@@ -181,3 +181,34 @@ pub fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
     ranks.broadcast(0, &mut bytes);
     String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::communicator::threads;
+
+    use super::*;
+
+    #[test]
+    fn what_one_rank_alone_is_given_is_an_error_on_all() {
+        let agreed = |given: [Option<&str>; 2]| {
+            threads::run(2, |ranks| {
+                let mine = given[ranks.rank()].map(str::to_owned);
+                agree_on(&ranks, Ok(mine), "a/path").map_err(|error| error.to_string())
+            })
+        };
+        assert_eq!(agreed([None, None]), [Ok(None), Ok(None)]);
+        let both = agreed([Some("file"), Some("file")]);
+        assert!(
+            both.iter().all(|mine| mine.as_ref().is_ok_and(|mine| mine.as_deref() == Some("file")))
+        );
+        for given in [[Some("file"), None], [None, Some("file")], [Some("file"), Some("other")]] {
+            let said = agreed(given);
+            let expected =
+                "'a/path': found another one on other ranks, or none; expected the same on all";
+            assert!(
+                said.iter().all(|said| said.as_ref().is_err_and(|it| it == expected)),
+                "{said:?}"
+            );
+        }
+    }
+}
