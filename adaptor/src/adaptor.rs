@@ -449,21 +449,27 @@ impl Adaptor {
         if self.communicator.size() == 1 {
             return fault.map_or(Ok(Some((called, outside))), Err);
         }
-        let due =
-            self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
+        let meets = self.meets();
         self.meetings.calls += 1;
         let fault = self.meetings.fault.take().or(fault);
-        // All ranks know alike of a motion under way; what only the step's own numbers could tell
-        // is left for the next meeting.
-        let under_way = self.paused
-            || !self.waiting_changes.is_empty()
-            || !self.resumed.is_over()
-            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
-        if !due && !under_way {
+        if !meets {
             self.meetings.fault = fault;
             return Ok(None);
         }
         meeting::meet(&*self.communicator, moment, fault, called, outside).map(Some)
+    }
+
+    /// Whether the ranks come together at the next call.
+    #[inline]
+    fn meets(&self) -> bool {
+        // All ranks know alike of a motion under way; what only the step's own numbers could tell
+        // is left for the next meeting.
+        self.communicator.size() == 1
+            || self.meetings.calls.is_multiple_of(self.config.steering.poll_steps.get().into())
+            || self.paused
+            || !self.waiting_changes.is_empty()
+            || !self.resumed.is_over()
+            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest())
     }
 
     /// Whether there are calls at which the ranks do not come together.
