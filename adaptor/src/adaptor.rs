@@ -131,6 +131,8 @@ struct Meetings {
     calls: u64,
     /// The fault of this rank since the last meeting.
     fault: Option<ExecuteError>,
+    /// The cycle of the last, where they do not come together at every call.
+    last: Option<u64>,
 }
 
 /// The part of `hello` that does not change from order to order.
@@ -292,7 +294,7 @@ impl Adaptor {
         }
         self.timing.cycles += 1;
         let moment = step.moment();
-        self.clock.set(moment.cycle, moment.time);
+        self.clock.set(moment);
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         self.has_begun = true;
@@ -306,6 +308,9 @@ impl Adaptor {
                     // All ranks must know before a step begins whether a pipeline is due. The clock
                     // therefore counts from the next step on.
                     self.pipelines.tell(outside);
+                }
+                if self.skips_meetings() {
+                    self.note_meeting(moment.cycle);
                 }
                 moved
             }
@@ -486,21 +491,40 @@ impl Adaptor {
         if self.communicator.size() == 1 {
             return fault.map_or(Ok(Some((called, outside))), Err);
         }
-        let due =
-            self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
+        let meets = self.meets();
         self.meetings.calls += 1;
         let fault = self.meetings.fault.take().or(fault);
-        // All ranks know alike of a motion under way; what only the step's own numbers could tell
-        // is left for the next meeting.
-        let under_way = self.paused
-            || !self.waiting_changes.is_empty()
-            || !self.resumed.is_over()
-            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
-        if !due && !under_way {
+        if !meets {
             self.meetings.fault = fault;
             return Ok(None);
         }
         meeting::meet(&*self.communicator, moment, fault, called, outside).map(Some)
+    }
+
+    /// Whether the ranks come together at the next call.
+    #[inline]
+    fn meets(&self) -> bool {
+        // All ranks know alike of a motion under way; what only the step's own numbers could tell
+        // is left for the next meeting.
+        self.communicator.size() == 1
+            || self.meetings.calls.is_multiple_of(self.config.steering.poll_steps.get().into())
+            || self.paused
+            || !self.waiting_changes.is_empty()
+            || !self.resumed.is_over()
+            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest())
+    }
+
+    /// Whether there are calls at which the ranks do not come together.
+    #[inline]
+    fn skips_meetings(&self) -> bool {
+        self.communicator.size() > 1 && self.config.steering.poll_steps.get() > 1
+    }
+
+    /// Notes the cycle of a meeting, which all ranks were at: what falls due behind it and before the
+    /// next runs at the next. What a step between them says is of one rank alone.
+    fn note_meeting(&mut self, cycle: u64) {
+        self.meetings.last = Some(cycle);
+        self.pipelines.set_met(cycle);
     }
 
     /// Whether there is nothing to do in this call.

@@ -247,6 +247,12 @@ impl Pipelines {
         self.runner.tell(outside.seconds, outside.viewers);
     }
 
+    /// Says that pipelines could run last at this cycle, where they cannot at every step.
+    #[inline]
+    pub(crate) fn set_met(&mut self, cycle: u64) {
+        self.runner.set_met(cycle);
+    }
+
     /// The cost and the monitors of each pipeline.
     pub(crate) fn reports(&self) -> Vec<PipelineReport> {
         let report = |(name, cost): (&str, Cost)| {

@@ -294,6 +294,24 @@ fn several_ranks_go_on_from_one_file() {
 }
 
 #[test]
+fn a_restart_that_only_some_ranks_were_given_is_refused_on_all() {
+    let output = tempfile::tempdir().unwrap();
+    for given in [[Some("a"), None], [None, Some("a")], [Some("a"), Some("b")]] {
+        let said = threads::run(2, |ranks| {
+            let file = given[ranks.rank()].map(|name| output.path().join(name));
+            let settings = Settings::default().on(Arc::new(ranks));
+            let settings = match file {
+                Some(file) => settings.restart_from_file(file),
+                None => settings,
+            };
+            settings.start().map(drop).unwrap_err().to_string()
+        });
+        assert_eq!(said[0], said[1]);
+        assert!(said[0].contains("rank 1: it is to go on from another checkpoint"), "{said:?}");
+    }
+}
+
+#[test]
 fn another_mesh_or_file_is_refused() {
     let output = tempfile::tempdir().unwrap();
     let orders = parse_orders(ORDERS, "orders.json").unwrap();

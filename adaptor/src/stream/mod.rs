@@ -175,6 +175,9 @@ pub enum StreamError {
 /// How long the end of a run waits for viewers to read that it ended.
 const END_TIME: Duration = Duration::from_secs(1);
 
+/// Threads for what would keep the others from being served.
+const BLOCKING_THREADS: usize = 2;
+
 /// A running server. Dropping it ends its threads.
 pub(crate) struct Server {
     links: Arc<Links>,
@@ -272,6 +275,9 @@ impl Server {
         let (stop, stopped) = oneshot::channel();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
+            // Answers that take long, of which there may be many asked for at once, and names that
+            // are looked up: none of them waits for another.
+            .max_blocking_threads(BLOCKING_THREADS)
             .build()
             .map_err(StreamError::Thread)?;
         let mut server =
