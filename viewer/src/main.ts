@@ -1,8 +1,6 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
-import { Connection, streamAddress } from "./connection/connection";
+import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
-import { Decoder } from "./connection/decoder";
-import type { DecodeWorker } from "./connection/decoder";
 import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
 import { Stack } from "./connection/stack";
 import { part, write } from "./dom";
@@ -13,7 +11,6 @@ import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
-import { compileKernel } from "./kernel/kernel";
 import { History } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
@@ -73,8 +70,12 @@ import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
 import type { State } from "./store/state";
 import { Store, sameJson } from "./store/store";
+import { addresses, kernel, stream } from "./start";
+
+const { connection } = stream;
 
 if (!document.createElement("canvas").getContext("webgl2")) {
+  connection.stop();
   showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
   throw new Error("WebGL 2 is missing");
 }
@@ -90,23 +91,8 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
     // A browser that keeps nothing, or is full: the page works all the same.
   }
 });
-const addresses = streamAddress(window.location.href);
-/** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
-const kernel = compileKernel();
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
 
-const connection = new Connection(addresses, {
-  state: (state, explanation) => {
-    if (state !== "connected") decoder.clear();
-    store.dispatch({ type: "connection", state, explanation });
-  },
-  message: takeMessage,
-  binary: (bytes) => {
-    bar.alive();
-    decoder.push(bytes);
-  },
-  trouble: report,
-});
 const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
 const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
@@ -311,14 +297,6 @@ new Tour(() => {
 }, reveal);
 part("tour-button").classList.toggle("primary", !kept.toured);
 
-const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
-kernel.then((module) => worker.postMessage({ module }), (error: unknown) => report(String(error)));
-const decoder = new Decoder(worker as unknown as DecodeWorker, {
-  frame: takeFrame,
-  decoded: (count) => connection.acknowledge(count),
-  lost: (reason) => connection.renew(`A frame could not be read: ${reason}.`),
-});
-
 function takeMessage(message: ServerMessage): void {
   // The bar looks itself whether there is news in a status.
   if (message.kind !== "status") bar.alive();
@@ -377,15 +355,10 @@ function takeFrame(frame: Frame): void {
   else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
-// A viewer that was here before comes back under its name; the other runs of a relay know it by others.
-const CLIENT = `tombolo-client ${location.pathname}`, BACK = `tombolo-back ${location.pathname}`;
-const [client, back] = [sessionStorage.getItem(CLIENT), sessionStorage.getItem(BACK)];
-connection.identity = client !== null && back !== null ? { client, back } : null;
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
-  sessionStorage.setItem(CLIENT, connection.identity.client);
-  sessionStorage.setItem(BACK, connection.identity.back);
+  keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
   if (!store.state.form) void loadSchema(hello.defaults);
 });
@@ -495,4 +468,11 @@ publish({
   featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
 });
 
-connection.start();
+kernel.catch((error: unknown) => report(String(error)));
+stream.listen({
+  state: (state, explanation) => store.dispatch({ type: "connection", state, explanation }),
+  message: takeMessage,
+  alive: () => bar.alive(),
+  frame: takeFrame,
+  trouble: report,
+});
