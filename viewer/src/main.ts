@@ -36,6 +36,8 @@ import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
+import { makeCanvas } from "./picture/canvas";
+import type { Canvas } from "./picture/canvas";
 import { ScalarBars, fieldText, withUnit } from "./picture/bars";
 import { Triad, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
@@ -74,12 +76,6 @@ import { addresses, kernel, stream } from "./start";
 
 const { connection } = stream;
 
-if (!document.createElement("canvas").getContext("webgl2")) {
-  connection.stop();
-  showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
-  throw new Error("WebGL 2 is missing");
-}
-
 const kept = new Kept(window.localStorage);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
 const DRAFTS = `tombolo-drafts ${location.pathname}`;
@@ -106,6 +102,15 @@ const onlyView = new URLSearchParams(window.location.search).get("view");
 document.body.dataset.embedded = String(onlyView !== null);
 
 // The picture.
+function canvasOfPage(): Canvas {
+  try {
+    return makeCanvas();
+  } catch (error) {
+    connection.stop();
+    showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
+    throw error;
+  }
+}
 const selection = new Selection(store);
 const triad = new Triad();
 /** A field and its component in words. */
@@ -122,7 +127,7 @@ const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
-const scene = new Scene(part("scene"), selection, {
+const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   bars: (shown) => {
     shownBars = shown;
     bars.show(shown);

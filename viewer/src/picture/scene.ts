@@ -4,7 +4,7 @@ import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
 import { BonesPicture } from "./bones";
-import { makeCanvas } from "./canvas";
+import type { Canvas } from "./canvas";
 import { ChosenFaces } from "./chosen-faces";
 import { EarlyFrames } from "./early-frames";
 import { Ghost } from "./ghost";
@@ -70,8 +70,7 @@ export class Scene {
   private waiting: number | null = null;
   private recolour = true;
 
-  constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
-    const { window, byProcessor } = makeCanvas();
+  constructor(private readonly container: HTMLElement, { window, byProcessor }: Canvas, private readonly selection: Selection, private readonly events: SceneEvents) {
     this.canvas = window;
     this.pace = new Pace(byProcessor, () => this.fit());
     this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
