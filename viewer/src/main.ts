@@ -16,6 +16,7 @@ import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
+import { Later } from "./later";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -87,6 +88,8 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
     // A browser that keeps nothing, or is full: the page works all the same.
   }
 });
+/** The first picture comes before all that can wait. */
+const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
 
 const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
@@ -94,7 +97,9 @@ const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
 store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
   if (state !== "connected") pipelines.forget();
-  else if (changes !== undefined) void pipelines.told(changes);
+  else if (changes !== undefined) later.run(() => {
+    if (store.state.connection.state === "connected") void pipelines.told(store.state.hello?.pipelines?.changes ?? changes);
+  });
 }, sameJson);
 
 // `?view=NAME` shows that view alone, without panels: for a page of one's own.
@@ -147,6 +152,7 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     compare.follow();
     linePlot.update();
     histogramPlot.update();
+    if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
 });
@@ -241,7 +247,7 @@ const linePlot = new LinePlot(store, pipelines, {
 const histogramPlot = new HistogramPlot(store, {
   content: contentOf, title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier);
-const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; });
+const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; }, (work) => later.run(work));
 for (const tab of [history, linePlot, histogramPlot]) dock.add(tab);
 new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
   scene.setTheme(theme);
@@ -365,7 +371,7 @@ store.watch((state) => state.hello, (hello) => {
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
-  if (!store.state.form) void loadSchema(hello.defaults);
+  if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
 
 async function loadJson(address: string): Promise<Json> {
