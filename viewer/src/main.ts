@@ -298,6 +298,8 @@ new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
 const form = new EditForm(part("fields"), store);
 const previewer = new Previewer(scene, addresses.surface, kernel, store);
+// Once the page has come to rest: nobody drags a shape in the first moment.
+later.run(() => window.setTimeout(() => previewer.prepare(), 500));
 new FilesPanel(store, commands, { surface: () => previewer.surfaceNow(), content: contentOf });
 const forecasts = new Forecasts(store, (order) => commands.ask({ forecast: order }));
 new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
