@@ -1,4 +1,7 @@
-/** Has the browser fetch and read the page's script (`main`) as soon as it reads `index.html`, beside the small one that begins. */
+/**
+ * Has `index.html` name the page's own script (`main`) too, behind the small one that begins and imports it: the browser fetches both at
+ * once, and a page that has loaded has run both.
+ */
 import type { Plugin } from "vite";
 
 export function preload(): Plugin {
@@ -8,7 +11,7 @@ export function preload(): Plugin {
     transformIndexHtml: {
       order: "post",
       handler: (_, { bundle }) => Object.values(bundle ?? {}).flatMap((file) =>
-        file.type === "chunk" && file.name === "main" ? [{ tag: "link", attrs: { rel: "modulepreload", href: `./${file.fileName}`, crossorigin: true }, injectTo: "head" as const }] : []),
+        file.type === "chunk" && file.name === "main" ? [{ tag: "script", attrs: { type: "module", crossorigin: true, src: `./${file.fileName}` }, injectTo: "head" as const }] : []),
     },
   };
 }
