@@ -10,7 +10,7 @@ import { createRequire } from "node:module";
 
 const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
 
-const FRAMES = 150, DRAGS = 60, HEAP_SECONDS = 30, HANDLE = "throat";
+const FRAMES = 150, DRAGS = 60, HEAP_SECONDS = 30, BROWSER_SECONDS = 2, HANDLE = "throat";
 const link = process.env.TOMBOLO_URL;
 if (!link) throw new Error("TOMBOLO_URL is not set: it is the link that the run printed");
 
@@ -44,6 +44,8 @@ try {
     };
     requestAnimationFrame(look);
   });
+  // A browser that was only just started is busy with itself: the page is opened in one that is there already.
+  await page.waitForTimeout(BROWSER_SECONDS * 1000);
   await page.goto(link);
   const firstPicture = await (await page.waitForFunction(() => window.firstPicture)).jsonValue();
   await page.waitForTimeout(1000);

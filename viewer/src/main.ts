@@ -1,8 +1,6 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
-import { Connection, streamAddress } from "./connection/connection";
+import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
-import { Decoder } from "./connection/decoder";
-import type { DecodeWorker } from "./connection/decoder";
 import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
 import { Stack } from "./connection/stack";
 import { part, write } from "./dom";
@@ -13,12 +11,12 @@ import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
-import { compileKernel } from "./kernel/kernel";
 import { History } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
+import { Later } from "./later";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -39,6 +37,8 @@ import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
 import { WheelPanel } from "./panels/wheel";
+import { makeCanvas } from "./picture/canvas";
+import type { Canvas } from "./picture/canvas";
 import { ScalarBars, fieldText, withUnit } from "./picture/bars";
 import { Triad, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
@@ -73,11 +73,9 @@ import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
 import type { State } from "./store/state";
 import { Store, sameJson } from "./store/store";
+import { addresses, kernel, stream } from "./start";
 
-if (!document.createElement("canvas").getContext("webgl2")) {
-  showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
-  throw new Error("WebGL 2 is missing");
-}
+const { connection } = stream;
 
 const kept = new Kept(window.localStorage);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
@@ -90,29 +88,18 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
     // A browser that keeps nothing, or is full: the page works all the same.
   }
 });
-const addresses = streamAddress(window.location.href);
-/** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
-const kernel = compileKernel();
+/** The first picture comes before all that can wait. */
+const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
 
-const connection = new Connection(addresses, {
-  state: (state, explanation) => {
-    if (state !== "connected") decoder.clear();
-    store.dispatch({ type: "connection", state, explanation });
-  },
-  message: takeMessage,
-  binary: (bytes) => {
-    bar.alive();
-    decoder.push(bytes);
-  },
-  trouble: report,
-});
 const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
 const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
 store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
   if (state !== "connected") pipelines.forget();
-  else if (changes !== undefined) void pipelines.told(changes);
+  else if (changes !== undefined) later.run(() => {
+    if (store.state.connection.state === "connected") void pipelines.told(store.state.hello?.pipelines?.changes ?? changes);
+  });
 }, sameJson);
 
 // `?view=NAME` shows that view alone, without panels: for a page of one's own.
@@ -120,6 +107,15 @@ const onlyView = new URLSearchParams(window.location.search).get("view");
 document.body.dataset.embedded = String(onlyView !== null);
 
 // The picture.
+function canvasOfPage(): Canvas {
+  try {
+    return makeCanvas();
+  } catch (error) {
+    connection.stop();
+    showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
+    throw error;
+  }
+}
 const selection = new Selection(store);
 const triad = new Triad();
 /** A field and its component in words. */
@@ -136,7 +132,7 @@ const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
-const scene = new Scene(part("scene"), selection, {
+const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   bars: (shown) => {
     shownBars = shown;
     bars.show(shown);
@@ -156,6 +152,7 @@ const scene = new Scene(part("scene"), selection, {
     compare.follow();
     linePlot.update();
     histogramPlot.update();
+    if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
 });
@@ -250,7 +247,7 @@ const linePlot = new LinePlot(store, pipelines, {
 const histogramPlot = new HistogramPlot(store, {
   content: contentOf, title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier);
-const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; });
+const dock = new Dock(part("dock"), kept.dock.open, (open) => { kept.dock = { ...kept.dock, open }; }, (work) => later.run(work));
 for (const tab of [history, linePlot, histogramPlot]) dock.add(tab);
 new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
   scene.setTheme(theme);
@@ -301,6 +298,8 @@ new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
 const form = new EditForm(part("fields"), store);
 const previewer = new Previewer(scene, addresses.surface, kernel, store);
+// Once the page has come to rest: nobody drags a shape in the first moment.
+later.run(() => window.setTimeout(() => previewer.prepare(), 500));
 new FilesPanel(store, commands, { surface: () => previewer.surfaceNow(), content: contentOf });
 const forecasts = new Forecasts(store, (order) => commands.ask({ forecast: order }));
 new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
@@ -310,14 +309,6 @@ new Tour(() => {
   part("tour-button").classList.remove("primary");
 }, reveal);
 part("tour-button").classList.toggle("primary", !kept.toured);
-
-const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
-kernel.then((module) => worker.postMessage({ module }), (error: unknown) => report(String(error)));
-const decoder = new Decoder(worker as unknown as DecodeWorker, {
-  frame: takeFrame,
-  decoded: (count) => connection.acknowledge(count),
-  lost: (reason) => connection.renew(`A frame could not be read: ${reason}.`),
-});
 
 function takeMessage(message: ServerMessage): void {
   // The bar looks itself whether there is news in a status.
@@ -377,17 +368,12 @@ function takeFrame(frame: Frame): void {
   else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
-// A viewer that was here before comes back under its name; the other runs of a relay know it by others.
-const CLIENT = `tombolo-client ${location.pathname}`, BACK = `tombolo-back ${location.pathname}`;
-const [client, back] = [sessionStorage.getItem(CLIENT), sessionStorage.getItem(BACK)];
-connection.identity = client !== null && back !== null ? { client, back } : null;
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
-  sessionStorage.setItem(CLIENT, connection.identity.client);
-  sessionStorage.setItem(BACK, connection.identity.back);
+  keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
-  if (!store.state.form) void loadSchema(hello.defaults);
+  if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
 
 async function loadJson(address: string): Promise<Json> {
@@ -495,4 +481,11 @@ publish({
   featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
 });
 
-connection.start();
+kernel.catch((error: unknown) => report(String(error)));
+stream.listen({
+  state: (state, explanation) => store.dispatch({ type: "connection", state, explanation }),
+  message: takeMessage,
+  alive: () => bar.alive(),
+  frame: takeFrame,
+  trouble: report,
+});

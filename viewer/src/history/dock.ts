@@ -25,8 +25,11 @@ export class Dock {
   private chosen: Tab | null = null;
   private seen: Tab | null = null;
 
-  /** `changed` is told whether it is open. */
-  constructor(private readonly root: HTMLElement, private isOpen: boolean, private readonly changed: (isOpen: boolean) => void) {
+  /** `changed` is told whether it is open; a tab is drawn when `later` does so. */
+  constructor(
+    private readonly root: HTMLElement, private isOpen: boolean, private readonly changed: (isOpen: boolean) => void,
+    private readonly later: (work: () => void) => void,
+  ) {
     root.replaceChildren(this.bar);
   }
 
@@ -70,7 +73,7 @@ export class Dock {
     const before = this.seen;
     this.seen = seen;
     before?.show(false);
-    seen?.show(true);
+    this.later(() => { if (seen === this.seen) seen?.show(true); });
   }
 
   /** The page has other colours. */

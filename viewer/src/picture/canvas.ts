@@ -33,25 +33,34 @@ export function drawnByProcessor(renderer: string): boolean {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
 }
 
+/** A canvas for WebGL 2, as vtk.js makes one. */
+function canvasFor(antialias: boolean): { canvas: HTMLCanvasElement; context: WebGL2RenderingContext } {
+  const canvas = document.createElement("canvas");
+  canvas.style.width = "100%";
+  // The first to ask for the context says what it is like.
+  const context = canvas.getContext("webgl2", { antialias, depth: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
+  if (!context) throw new Error("WebGL 2 is missing");
+  return { canvas, context };
+}
+
 /** What draws WebGL here, as far as the browser tells. */
-function rendererName(): string {
-  const context = document.createElement("canvas").getContext("webgl2");
-  if (!context) return "";
+function rendererName(context: WebGL2RenderingContext): string {
   const details = context.getExtension("WEBGL_debug_renderer_info");
-  const name = String(context.getParameter(details ? details.UNMASKED_RENDERER_WEBGL : context.RENDERER));
-  context.getExtension("WEBGL_lose_context")?.loseContext();
-  return name;
+  return String(context.getParameter(details ? details.UNMASKED_RENDERER_WEBGL : context.RENDERER));
 }
 
 export interface Canvas { window: vtkOpenGLRenderWindow; byProcessor: boolean }
 
+/** Fails where the browser has no WebGL 2. */
 export function makeCanvas(): Canvas {
-  const window = vtkOpenGLRenderWindow.newInstance();
-  const byProcessor = drawnByProcessor(rendererName());
-  // The first to ask for the context says what it is like.
-  window.getCanvas()?.getContext("webgl2", {
-    antialias: !byProcessor, depth: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance",
-  });
+  // Where a processor draws, which takes the longest to make one, the first is the one that is wanted.
+  let { canvas, context } = canvasFor(false);
+  const byProcessor = drawnByProcessor(rendererName(context));
+  if (!byProcessor) {
+    context.getExtension("WEBGL_lose_context")?.loseContext();
+    ({ canvas, context } = canvasFor(true));
+  }
+  const window = vtkOpenGLRenderWindow.newInstance({ canvas });
   window.getRenderPasses()?.[0]?.set({ translucentPass: blending }, true, true);
   return { window, byProcessor };
 }

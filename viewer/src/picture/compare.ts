@@ -5,6 +5,7 @@ import type { Look, Looks } from "../store/looks";
 import type { Selection } from "../store/selection";
 import type { Stand } from "./camera";
 import type { Earlier } from "./earlier";
+import { makeCanvas } from "./canvas";
 import { Scene } from "./scene";
 import type { Bar } from "./scene";
 import type { Theme } from "./theme";
@@ -41,7 +42,7 @@ export class Compare {
     requestAnimationFrame(() => requestAnimationFrame(() => this.main.camera.fit()));
     if (!this.shown) return;
     if (this.earlier.moment.size === 0) this.earlier.keepNow();
-    this.scene ??= new Scene(this.place, this.source.selection, {
+    this.scene ??= new Scene(this.place, makeCanvas(), this.source.selection, {
       bars: () => undefined,
       drawn: () => this.linkFrom(),
       trouble: (message) => this.source.trouble(message),

@@ -21,6 +21,8 @@ export const HIGHLIGHT_COLOURS: Record<Highlight, Colour> = {
   hover: [1, 1, 1], handle: [1, 0.6, 0.2], fixed: [0.35, 0.72, 1],
 };
 const HIGHLIGHT_OPACITY: Record<Highlight, number> = { hover: 0.25, handle: 0.35, fixed: 0.4 };
+/** How far each lies above the surface; its outline lies higher. */
+const HIGHLIGHT_ORDER: Record<Highlight, number> = { hover: -1.5, handle: -1, fixed: -1 };
 const SOLID: Colour = [0.72, 0.76, 0.8];
 
 /** Cells as vtk.js wants them: the number of points before each cell's points. */
@@ -69,6 +71,8 @@ export class Piece {
   }
 }
 
+interface HighlightPieces { tint: Piece; outline: Piece }
+
 export class Layer {
   topology: TopologyFrame | null = null;
   frame: DataFrame | null = null;
@@ -83,7 +87,7 @@ export class Layer {
   private readonly points = vtkPoints.newInstance();
   private readonly surface: Piece;
   private readonly edges: Piece;
-  private readonly highlights: Record<Highlight, { tint: Piece; outline: Piece }>;
+  private readonly highlights: Partial<Record<Highlight, HighlightPieces>> = {};
   private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
 
   constructor(readonly name: string, readonly kind: string, look: Look, private readonly renderer: vtkRenderer) {
@@ -106,21 +110,24 @@ export class Layer {
     this.edges = new Piece(this.points, renderer);
     this.edges.actor.getProperty().setLighting(false);
     this.raise(this.edges, -2);
-    const highlight = (kindOf: Highlight, order: number): { tint: Piece; outline: Piece } => {
-      const tint = new Piece(this.points, renderer);
-      const outline = new Piece(this.points, renderer);
-      for (const piece of [tint, outline]) {
-        piece.actor.getProperty().setColor(...HIGHLIGHT_COLOURS[kindOf]);
-        piece.actor.setVisibility(false);
-        this.raise(piece, piece === tint ? order : order - 2);
-      }
-      tint.actor.getProperty().setOpacity(HIGHLIGHT_OPACITY[kindOf]);
-      tint.actor.getProperty().setAmbient(0.5);
-      tint.actor.getProperty().setDiffuse(0.5);
-      outline.actor.getProperty().setLighting(false);
-      return { tint, outline };
-    };
-    this.highlights = { fixed: highlight("fixed", -1), handle: highlight("handle", -1), hover: highlight("hover", -1.5) };
+  }
+
+  /** The pieces of a highlight, made when it is first wanted: every piece takes its time, also one that is not seen. */
+  private highlightOf(kind: Highlight): HighlightPieces {
+    const known = this.highlights[kind];
+    if (known) return known;
+    const tint = new Piece(this.points, this.renderer);
+    const outline = new Piece(this.points, this.renderer);
+    const order = HIGHLIGHT_ORDER[kind];
+    for (const piece of [tint, outline]) {
+      piece.actor.getProperty().setColor(...HIGHLIGHT_COLOURS[kind]);
+      this.raise(piece, piece === tint ? order : order - 2);
+    }
+    tint.actor.getProperty().setOpacity(HIGHLIGHT_OPACITY[kind]);
+    tint.actor.getProperty().setAmbient(0.5);
+    tint.actor.getProperty().setDiffuse(0.5);
+    outline.actor.getProperty().setLighting(false);
+    return this.highlights[kind] = { tint, outline };
   }
 
   private raise(piece: Piece, order: number): void {
@@ -237,7 +244,7 @@ export class Layer {
       if (wanted.has(feature)) picked.push(topology.triangles[3 * triangle]!, topology.triangles[3 * triangle + 1]!, topology.triangles[3 * triangle + 2]!);
     });
     const triangles = Uint32Array.from(picked);
-    const { tint, outline } = this.highlights[kind];
+    const { tint, outline } = this.highlightOf(kind);
     tint.setTriangles(triangles);
     outline.setLines(featureEdges(triangles, new Uint32Array(triangles.length / 3), topology.points));
   }
@@ -257,8 +264,8 @@ export class Layer {
     property.setOpacity(opacity);
     property.setEdgeVisibility(edges === "mesh");
     this.edges.actor.setVisibility(drawn && edges !== "none" && this.topology?.triangleFeatures !== null);
-    for (const kind of Object.keys(this.highlights) as Highlight[]) {
-      for (const piece of Object.values(this.highlights[kind])) piece.actor.setVisibility(drawn && this.highlighted[kind] !== "");
+    for (const [kind, pieces] of Object.entries(this.highlights)) {
+      for (const piece of [pieces.tint, pieces.outline]) piece.actor.setVisibility(drawn && this.highlighted[kind as Highlight] !== "");
     }
   }
 }

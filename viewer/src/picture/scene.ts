@@ -4,7 +4,7 @@ import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import vtkRenderWindowInteractor from "@kitware/vtk.js/Rendering/Core/RenderWindowInteractor";
 import { BonesPicture } from "./bones";
-import { makeCanvas } from "./canvas";
+import type { Canvas } from "./canvas";
 import { ChosenFaces } from "./chosen-faces";
 import { EarlyFrames } from "./early-frames";
 import { Ghost } from "./ghost";
@@ -57,10 +57,13 @@ export class Scene {
   private readonly pending = new Map<string, DataFrame>();
   private readonly early = new EarlyFrames();
   private readonly ghost: Ghost;
-  private readonly bones: BonesPicture;
-  private readonly chosen: ChosenFaces;
+  /** These two are made when they are first shown. */
+  private bones: BonesPicture | null = null;
+  private chosen: ChosenFaces | null = null;
   private features: string[] = [];
   private held = false;
+  /** Whether nothing was ever drawn. */
+  private isEmpty = true;
   private theme: Theme = "dark";
   private scheduled = false;
   /** Who waits for the next picture. */
@@ -70,8 +73,7 @@ export class Scene {
   private waiting: number | null = null;
   private recolour = true;
 
-  constructor(private readonly container: HTMLElement, private readonly selection: Selection, private readonly events: SceneEvents) {
-    const { window, byProcessor } = makeCanvas();
+  constructor(private readonly container: HTMLElement, { window, byProcessor }: Canvas, private readonly selection: Selection, private readonly events: SceneEvents) {
     this.canvas = window;
     this.pace = new Pace(byProcessor, () => this.fit());
     this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
@@ -90,17 +92,19 @@ export class Scene {
     });
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
-    this.chosen = new ChosenFaces(this.renderer);
     this.ghost = new Ghost(this.renderer);
-    // What lies in the middle of a shape would be hidden by it.
+    this.resize();
+  }
+
+  /** A renderer over the other one: what lies in the middle of a shape would be hidden by it. */
+  private above(): vtkRenderer {
     const above = vtkRenderer.newInstance();
     above.setLayer(1);
     above.setInteractive(false);
     above.setActiveCamera(this.renderer.getActiveCamera());
     this.window.setNumberOfLayers(2);
     this.window.addRenderer(above);
-    this.bones = new BonesPicture(above);
-    this.resize();
+    return above;
   }
 
   /** The surface that previews are shapes of. */
@@ -118,18 +122,20 @@ export class Scene {
 
   /** Colours faces that are chosen, by the indices of their corners; none takes them away. */
   setChosenFaces(points: Float32Array, corners: Uint32Array): void {
-    this.chosen.show(points, corners);
+    if (corners.length > 0) this.chosen ??= new ChosenFaces(this.renderer);
+    this.chosen?.show(points, corners);
     this.request();
   }
 
   /** Shows a skeleton; null takes it away. */
   setBones(bones: Bones | null): void {
-    this.bones.show(bones);
+    if (bones) this.bones ??= new BonesPicture(this.above());
+    this.bones?.show(bones);
     this.request();
   }
 
   get shownBones(): Bones | null {
-    return this.bones.shown;
+    return this.bones?.shown ?? null;
   }
 
   /** The place of the page at which a point is drawn. */
@@ -389,7 +395,9 @@ export class Scene {
     const context = this.canvas.get3DContext({}) as WebGL2RenderingContext;
     const bytes = new Uint8Array(4 * width * height);
     context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, bytes);
-    return bytes.reduce((hash, byte) => Math.imul(hash ^ byte, 0x01000193), 0x811c9dc5) >>> 0;
+    let hash = 0x811c9dc5;
+    for (const byte of bytes) hash = Math.imul(hash ^ byte, 0x01000193);
+    return hash >>> 0;
   }
 
   /** Draws new values, but leaves as much time between pictures as they take: messages and the person come first. */
@@ -417,6 +425,9 @@ export class Scene {
       layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
       layer.show();
     }
+    // Until the first values are there the page says what is waited for: no time is spent on a picture of nothing.
+    this.isEmpty &&= [...this.layers.values()].every((layer) => layer.frame === null);
+    if (this.isEmpty) return this.turned();
     if (!this.camera.isPlaced && this.box()) this.camera.reset();
     this.renderer.resetCameraClippingRange();
     this.window.render();

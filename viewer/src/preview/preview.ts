@@ -1,7 +1,7 @@
 /**
  * The preview of an edit: the shape that it would make, computed in this browser from the reference surface.
  *
- * The surface is asked for once, when the first preview needs it; from then on nothing waits for the network. While one preview is
+ * The surface is asked for once, when the first preview needs it or before that (`prepare`); from then on nothing waits for the network. While one preview is
  * computed the newest wish waits and those before it are forgotten, so that a preview never falls behind the hand that makes it.
  */
 import type { Json, SurfaceInformation } from "../connection/protocol";
@@ -77,6 +77,11 @@ export class Preview {
     this.wanted = null;
     this.wantedPoints = null;
     this.clear();
+  }
+
+  /** Has the surface here before anything is wished for, so that the first preview need not wait for it. */
+  prepare(): void {
+    if (this.known !== null && this.state === "absent") void this.fetch();
   }
 
   /** Asks for the skeleton of the shape that `stack` has made. */
@@ -165,14 +170,15 @@ export class Preview {
     }
   }
 
-  /** There is no surface; the next wish asks for it again. */
+  /** There is no surface; the next wish asks for it again. Where nothing is wished for yet, nobody need hear of it. */
   private without(kind: FailureKind | "surface-missing", reason: string): void {
+    const isWanted = this.waiting !== null || this.wanted !== null || this.wantedPoints !== null;
     this.state = "absent";
     this.waiting = null;
     if (this.wanted !== null) this.events.skeleton(null, reason);
     this.wanted = null;
     this.wantedPoints = null;
-    this.events.failed(kind, reason);
+    if (isWanted) this.events.failed(kind, reason);
   }
 
   private answer(answer: PreviewAnswer): void {

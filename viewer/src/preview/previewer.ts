@@ -4,6 +4,7 @@ import type { ShapeFaults } from "../kernel/kernel";
 import type { Scene } from "../picture/scene";
 import type { Action } from "../store/actions";
 import { wishedStack } from "../store/draft";
+import { mayDrive } from "../store/run";
 import { NO_PREVIEW } from "../store/state";
 import type { PreviewState, State } from "../store/state";
 import { sameJson } from "../store/store";
@@ -13,6 +14,9 @@ import type { PreviewShape, PreviewSurface, PreviewWorker } from "./preview";
 
 /** A surface with its points in the reference and in the shape that is. */
 export interface ShownPoints extends PreviewSurface { reference: Float64Array; points: Float32Array }
+
+/** A surface of more vertices than these comes when somebody asks for a preview, and not before. */
+const PREPARED = 200_000;
 
 export class Previewer {
   private preview: Preview | null = null;
@@ -35,6 +39,11 @@ export class Previewer {
       this.show(this.wished);
     }, sameJson);
     store.watch(wishedStack, (wished) => this.show(wished), sameJson);
+  }
+
+  /** Has the kernel and the surface ready before the first preview, where this viewer may change the shape. */
+  prepare(): void {
+    if (this.surface && this.surface.vertices <= PREPARED && mayDrive(this.store.state)) this.started().prepare();
   }
 
   /** Tells the points of the surface, and of each shape that it takes from now on. */
@@ -80,7 +89,7 @@ export class Previewer {
     this.started().show(this.stack, wished);
   }
 
-  /** The kernel is loaded when it is first needed. */
+  /** The kernel is started when it is first needed. */
   private started(): Preview {
     if (this.preview) return this.preview;
     const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });

@@ -29,7 +29,7 @@ describe("the plots below the picture", () => {
     for (const cycle of [1, 2]) history.add("health", cycle, cycle, { "quality.min": 0.5 });
     const root = document.createElement("div");
     document.body.append(root);
-    const dock = new Dock(root, true, () => undefined);
+    const dock = new Dock(root, true, () => undefined, (work) => work());
     dock.add(new HistoryPlot(history, null, () => undefined));
     const [{ options, redraw }] = made as [typeof made[0]];
     const colours = (): unknown[] => (options.axes ?? []).flatMap(({ stroke, grid, ticks }) => [stroke, grid?.stroke, ticks?.stroke].map((one) => (typeof one === "function" ? (one as () => unknown)() : one)));

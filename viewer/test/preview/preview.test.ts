@@ -55,6 +55,27 @@ describe("the preview", () => {
     expect(fetched()).toBe(1);
   });
 
+  it("has the surface ready where it was prepared, and says nothing where that fails before anything is wished for", async () => {
+    const ready = setUp();
+    ready.preview.offer(A);
+    ready.preview.prepare();
+    ready.preview.prepare();
+    await settled();
+    ready.opened("a");
+    ready.preview.show([], edit(1));
+    ready.work();
+    expect(ready.heard).toEqual(["cleared", "surface", "shape 1"]);
+    expect(ready.fetched()).toBe(1);
+    const failing = setUp(async () => { throw new Error("gone"); });
+    failing.preview.offer(A);
+    failing.preview.prepare();
+    await settled();
+    expect(failing.heard).toEqual(["cleared"]);
+    failing.preview.show([], edit(1));
+    await settled();
+    expect(failing.heard).toEqual(["cleared", "surface-missing: gone"]);
+  });
+
   it("computes the newest wish only, one at a time, and shows nothing that was taken away", async () => {
     const { preview, heard, opened, numbers, work } = setUp();
     preview.offer(A);
