@@ -104,8 +104,9 @@ pub(crate) fn share(
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
     use tombolo_deform::communicator::threads;
-    use tombolo_pipelines::{language::parse_json, limits::DOCUMENT};
+    use tombolo_pipelines::{language::parse_json, limits::VALUES};
 
     use super::*;
 
@@ -166,9 +167,13 @@ mod tests {
 
     #[test]
     fn commands_that_are_more_than_one_document_reach_all_ranks() {
-        let cancel = format!(r#"{{"cancel": {{"order": "{}"}}}}"#, "a".repeat(DOCUMENT.most / 2));
+        // Each is allowed, five values for each vertex; together they are more than one text may have.
+        let vertices: Vec<usize> = (0..VALUES.most / 9).collect();
+        let values = vec![[0.0; 3]; vertices.len()];
+        let edit = json!({"displacement": {"vertices": vertices, "values": values}});
+        let order = json!({"order": {"edits": [edit]}}).to_string();
         let shared = threads::run(2, |ranks| {
-            let waiting = ["1", "2"].map(|id| (id, cancel.as_str()));
+            let waiting = ["1", "2"].map(|id| (id, order.as_str()));
             let waiting = waiting.into_iter().chain([("3", r#"{"stop": {}}"#)]);
             let waiting = waiting
                 .map(|(id, text)| (id.to_owned(), parse_json::<Command>(text, "message").unwrap()));
