@@ -394,8 +394,8 @@ impl Hub {
             None if state.clients.len() >= place => return Ok(Arrival::Full),
             None => state.wheel.stranger()?,
         };
-        let client =
-            Arc::new(Client::new(id, access, back, state.views.keys().copied(), Pace::default()));
+        let (views, is_known) = (state.view_numbers(), state.is_described());
+        let client = Arc::new(Client::new(id, access, back, views, Pace::default(), is_known));
         state.seat(&client);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
         drop(state);
@@ -501,6 +501,11 @@ impl HubState {
 
     pub(super) fn has_audience(&self) -> bool {
         self.audience().next().is_some()
+    }
+
+    /// Whether the run has said what it is.
+    pub(super) fn is_described(&self) -> bool {
+        self.description.is_some()
     }
 
     /// The numbers of the views.

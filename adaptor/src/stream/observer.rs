@@ -46,8 +46,9 @@ impl Observer {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build()?;
         let secret = Secret::random().map_err(|error| io::Error::other(error.to_string()))?;
         let mut state = lock(&hub.state);
+        let (views, is_known) = (state.view_numbers(), state.is_described());
         let client =
-            Arc::new(Client::new(0, Access::Watch, secret, state.view_numbers(), Pace::exact()));
+            Arc::new(Client::new(0, Access::Watch, secret, views, Pace::exact(), is_known));
         state.observer = Some(Arc::clone(&client));
         drop(state);
         hub.look();

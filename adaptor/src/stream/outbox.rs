@@ -230,18 +230,19 @@ pub(super) enum Message {
 }
 
 impl Client {
-    /// A viewer that is to be greeted, and needs a key frame of each of these views; `pace` is how
-    /// each of its views begins.
+    /// A viewer that is to be greeted, now or once it `is_known` what the run is, and needs a key
+    /// frame of each of these views; `pace` is how each of its views begins.
     pub(super) fn new(
         id: u64,
         access: Access,
         back: Secret,
         views: impl Iterator<Item = usize>,
         pace: Pace,
+        is_known: bool,
     ) -> Self {
         let behind = || Unread { is_behind: true, pace: pace.clone(), ..Unread::default() };
         let views = views.map(|view| (view, behind())).collect();
-        let outbox = Outbox { hello: true, views, pace, ..Outbox::default() };
+        let outbox = Outbox { hello: is_known, views, pace, ..Outbox::default() };
         Self { id, access, back, wake: Notify::new(), outbox: Mutex::new(outbox) }
     }
 
@@ -255,6 +256,10 @@ impl Client {
         if std::mem::take(&mut outbox.hello) {
             let is_first = !std::mem::replace(&mut outbox.has_been_greeted, true);
             return Ok(Some(Message::Hello { is_first }));
+        }
+        // Nothing comes before it: who comes while the run is set up is greeted at the end of that.
+        if !outbox.has_been_greeted && !outbox.has_ended {
+            return Ok(None);
         }
         if let Some(text) = outbox.texts.pop_front() {
             return Ok(Some(Message::Text(text)));
