@@ -92,7 +92,11 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
 const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
 
-const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
+const stack = new Stack(addresses.stack, {
+  awaited: () => store.dispatch({ type: "stack awaited", undoable: stack.told.undoable }),
+  changed: () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }),
+  trouble: report,
+});
 const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
 store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
@@ -360,7 +364,7 @@ function takeMonitor(monitor: Monitor): void {
 function takeHello({ stack: told, ...hello }: ToldHello): void {
   // Until the edits of a new connection are here, those of before are shown.
   if (told) stack.begin(told);
-  store.dispatch({ type: "hello", hello: { ...hello, stack: stack.edits, undoable: stack.told.undoable } });
+  store.dispatch({ type: "hello", hello: { ...hello, stack: stack.edits, isAwaitingEdits: !stack.isWhole, undoable: stack.told.undoable } });
 }
 
 function takeFrame(frame: Frame): void {

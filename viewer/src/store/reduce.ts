@@ -41,6 +41,7 @@ function after(state: State, action: Action): State {
     }
     case "hello": return withHello(state, action.hello);
     case "stack": return withStack(state, action.edits, action.undoable);
+    case "stack awaited": return state.hello ? { ...state, hello: { ...state.hello, isAwaitingEdits: true, undoable: action.undoable } } : state;
     case "precision": return { ...state, coarser: { ...state.coarser, [action.view]: action.coarser } };
     case "status": {
       const { status, at } = action;
@@ -138,7 +139,7 @@ function withHello(state: State, hello: Hello): State {
 }
 
 function withStack(state: State, edits: Json[], undoable: number | undefined): State {
-  return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, undoable } }) : state;
+  return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, isAwaitingEdits: false, undoable } }) : state;
 }
 
 /** The next state, in which an edit that is not there any more is not changed any more. */
