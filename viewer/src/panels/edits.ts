@@ -204,7 +204,7 @@ export class EditsPanel {
 }
 
 function undoState(state: State): { undo: boolean; redo: boolean; why: string; composing: boolean } {
-  return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotSteering(state), composing: state.draft.past.length > 0 };
+  return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotEditable(state), composing: state.draft.past.length > 0 };
 }
 
 function partsName(edit: Json): string {

@@ -2,8 +2,7 @@
 import { part } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { isRedoable, undoable } from "../store/edits";
-import { isSteering } from "../store/run";
+import { isRedoable, undoable, whyNotEditable } from "../store/edits";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
@@ -29,8 +28,8 @@ export function watchKeys(store: Store<State, Action>, commands: Commands): void
     event.preventDefault();
     if (!event.shiftKey) {
       if (state.draft.past.length > 0) store.dispatch({ type: "step back" });
-      else if (isSteering(state) && undoable(state) > 0) commands.undo();
+      else if (whyNotEditable(state) === "" && undoable(state) > 0) commands.undo();
     } else if (state.draft.future.length > 0) store.dispatch({ type: "step forward" });
-    else if (isSteering(state) && isRedoable(state)) commands.redo();
+    else if (whyNotEditable(state) === "" && isRedoable(state)) commands.redo();
   });
 }

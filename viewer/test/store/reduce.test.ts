@@ -173,15 +173,64 @@ describe("taking back", () => {
   it("of an undo brings the same stack back", () => {
     const { store, commands, greet, orders } = page({ stack: [pinch(0.5)] });
     expect(isRedoable(store.state)).toBe(false);
+    const applied = (): void => store.dispatch({ type: "order", status: { id: store.state.orders.at(-1)!.id, status: "applied" } });
     commands.undo();
+    applied();
     greet({ stack: [] });
     expect(isRedoable(store.state)).toBe(true);
     commands.redo();
     expect(orders()).toEqual([{ undo: 1 }, { stack: [pinch(0.5)] }]);
+    applied();
     greet({ stack: [pinch(0.5)] });
     expect(isRedoable(store.state)).toBe(false);
     commands.redo();
     expect(orders()).toHaveLength(2);
+  });
+
+  it("waits for an order that is on its way, so that each is brought back by itself", () => {
+    const { store, commands, orders } = page({ stack: [pinch(0.5), pinch(0.6)], undoable: 2 });
+    const begun = (edits: Json[]): void => {
+      store.dispatch({ type: "order", status: { id: store.state.orders.at(-1)!.id, status: "applying" } });
+      store.dispatch({ type: "stack", edits, undoable: edits.length });
+    };
+    commands.undo();
+    commands.undo();
+    expect(orders()).toEqual([{ undo: 1 }]);
+    begun([pinch(0.5)]);
+    commands.undo();
+    begun([]);
+    commands.redo();
+    expect(orders().at(-1)).toEqual({ stack: [pinch(0.5)] });
+    begun([pinch(0.5)]);
+    // Nor is an order taken back before it has changed the stack: nobody could bring it back.
+    commands.order({ edits: [pinch(0.7)] });
+    commands.undo();
+    commands.redo();
+    expect(orders().at(-1)).toEqual({ edits: [pinch(0.7)] });
+    begun([pinch(0.5), pinch(0.7)]);
+    commands.undo();
+    begun([pinch(0.5)]);
+    expect(isRedoable(store.state)).toBe(true);
+  });
+
+  it("waits for the edits of a stack that is another one, and of a connection that has come back", () => {
+    const { store, commands, greet, sent } = page({ stack: [pinch(0.5)] });
+    expect(whyNotEditable(store.state)).toBe("");
+    store.dispatch({ type: "stack awaited", undoable: 2 });
+    expect([whyNotEditable(store.state), undoable(store.state)]).toEqual(["The edits are being loaded.", 2]);
+    commands.undo();
+    store.dispatch({ type: "stack", edits: [pinch(0.5), pinch(0.6)], undoable: 2 });
+    expect(whyNotEditable(store.state)).toBe("");
+    store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    store.dispatch({ type: "connection", state: "connected", explanation: "" });
+    expect(whyNotEditable(store.state)).toBe("The edits are being loaded.");
+    commands.undo();
+    greet({ stack: [pinch(0.5)], isAwaitingEdits: true });
+    expect(whyNotEditable(store.state)).toBe("The edits are being loaded.");
+    store.dispatch({ type: "edit loaded", index: 0 });
+    store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.4] }, step: "typed" });
+    expect(applyButton(store.state)).toMatchObject({ label: "Update edit 1", why: "The edits are being loaded." });
+    expect(sent).toEqual([]);
   });
 
   it("does not go over what another has ordered meanwhile", () => {
