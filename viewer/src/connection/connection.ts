@@ -161,6 +161,8 @@ export class Connection {
       this.again("reconnecting", error instanceof Error ? error.message : String(error), backOff(this.attempt++, this.surroundings.random()));
       return;
     }
+    // One that was being opened is not waited for any more.
+    this.letGo();
     socket.binaryType = "arraybuffer";
     this.socket = socket;
     this.listen();
@@ -209,7 +211,7 @@ export class Connection {
   private async lost(opened: boolean, reason: string): Promise<void> {
     // A browser does not say why an opening failed; an ordinary request to the same address does.
     const answer = opened ? null : await this.surroundings.probe(this.target.probe);
-    if (this.closed) return;
+    if (this.closed || this.socket) return;
     if (answer?.status === 401) {
       this.again("refused", "The simulation does not know this browser, or another one runs here now.", REFUSED_DELAY);
     } else if (answer?.status === 403) {
