@@ -414,10 +414,11 @@ store.watch((state) => state.errors, (errors) => {
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
 /** What is said in place of the picture, as long as there is none. */
-function emptyText({ frames, connection: { state }, hello, end }: State): [string, string] {
+function emptyText({ frames, connection: { state, explanation }, hello, end }: State): [string, string] {
   if (frames.count > 0) return ["", ""];
   if (end) return ["The run has ended", "No picture came before its end."];
   if (state === "refused") return ["This link does not open the simulation", "It was used already, or is of another run. Open a link that this simulation told when it started."];
+  if (state === "dismissed") return ["Not connected any more", explanation];
   if (state !== "connected") return ["Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there."];
   if (hello && hello.views.length === 0) return ["Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage."];
   return ["Connected", "The first picture appears when the simulation has taken its next step."];
@@ -485,7 +486,6 @@ publish({
   featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
 });
 
-kernel.catch((error: unknown) => report(String(error)));
 stream.listen({
   state: (state, explanation) => store.dispatch({ type: "connection", state, explanation }),
   message: takeMessage,
