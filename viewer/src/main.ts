@@ -418,7 +418,7 @@ function emptyText({ frames, connection: { state, explanation }, hello, end }: S
   if (frames.count > 0) return ["", ""];
   if (end) return ["The run has ended", "No picture came before its end."];
   if (state === "refused") return ["This link does not open the simulation", "It was used already, or is of another run. Open a link that this simulation told when it started."];
-  if (state === "dismissed") return ["Not connected any more", explanation];
+  if (state === "dismissed") return ["Not connected", explanation];
   if (state !== "connected") return ["Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there."];
   if (hello && hello.views.length === 0) return ["Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage."];
   return ["Connected", "The first picture appears when the simulation has taken its next step."];
