@@ -108,11 +108,14 @@ function after(state: State, action: Action): State {
   }
 }
 
-function withFrame({ count, cycle: newest, views }: Frames, view: string, cycle: number): Frames {
-  const before = views[view];
+function withFrame({ count, views: known }: Frames, view: string, cycle: number): Frames {
+  const before = Object.hasOwn(known, view) ? known[view] : undefined;
+  // A view that goes back does so with all others: what these have shown is of the future.
+  const views = before && cycle < before.cycle ? {} : known;
   const gap = before && cycle > before.cycle ? cycle - before.cycle : null;
   const gaps = gap === null ? before?.gaps ?? [] : [...before!.gaps, gap].slice(-LONGEST_GAPS);
-  return { count: count + 1, cycle: Math.max(newest ?? cycle, cycle), views: { ...views, [view]: { cycle, gaps } } };
+  const next = { ...views, [view]: { cycle, gaps } };
+  return { count: count + 1, cycle: Math.max(...Object.values(next).map((shown) => shown.cycle)), views: next };
 }
 
 function withHello(state: State, hello: Hello): State {
@@ -126,7 +129,8 @@ function withHello(state: State, hello: Hello): State {
     ...state, hello, ...viewsOf(state, hello),
     connection: { ...state.connection, known: true, fresh: false },
     selection: { parts: sameJson(parts, state.selection.parts) ? state.selection.parts : parts, hovered: hovered !== null && names.has(hovered) ? hovered : null },
-    orders: ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
+    // Each hello of a recording has all orders of its moment: what is known beside them is of another one.
+    orders: hello.recording ? ordersReconciled([], hello.orders, false) : ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
     askedBy: hello.role === "driver" ? state.askedBy : null,
     following: hello.role !== "driver" && state.following,
     followedBy: hello.role === "driver" ? state.followedBy : 0,
