@@ -341,7 +341,7 @@ function takeMessage(message: ServerMessage): void {
       return store.dispatch({ type: "end", end: message.body });
     case "error": {
       const { id, message: text } = message.body;
-      if (pipelines.answered(id)) void pipelines.told(-2);
+      if (pipelines.answered(id)) void pipelines.reload();
       if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
