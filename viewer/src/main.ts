@@ -267,7 +267,7 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
   },
   trouble: report,
 });
-const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
+const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
   history.choose(key);
   dock.choose(history);
 });
