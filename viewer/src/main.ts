@@ -11,7 +11,7 @@ import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
-import { History } from "./history/series";
+import { History, seriesKey } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
@@ -326,7 +326,7 @@ function takeMessage(message: ServerMessage): void {
       if (message.body.status === "applied") pipelines.answered(message.body.id);
       return store.dispatch({ type: "pipelines outcome", change: message.body });
     // The status shows what it has changed.
-    case "done": return;
+    case "done": return parameters.done(message.body.id);
     case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
     case "link": return void people.take(message.body);
@@ -373,6 +373,10 @@ store.watch((state) => state.hello, (hello) => {
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
+  if (hello.monitors) {
+    monitors.keep(hello.monitors);
+    monitored.keep(hello.monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
+  }
   if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
 
