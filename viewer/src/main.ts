@@ -17,6 +17,7 @@ import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
+import { own } from "./own";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -120,7 +121,7 @@ const selection = new Selection(store);
 const triad = new Triad();
 /** A field and its component in words. */
 const fieldTitle = (field: string | null, component: number): string =>
-  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, FIELD_TITLES[field ?? ""]);
+  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
 /** The unit of a field; null where none is given. */
 const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
@@ -128,7 +129,7 @@ const titleWithUnit = (field: string | null, component: number): string => withU
 let shownBars: Bar[] = [];
 const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
-    const look = store.state.looks[view];
+    const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
@@ -240,7 +241,7 @@ function contentOf(view: string): Content | null {
 }
 const monitored = new History();
 const history = new HistoryPlot(monitored, kept.dock.chosen, (chosen) => { kept.dock = { ...kept.dock, chosen }; });
-const lookOf = (view: string | null): Look | null => (view === null ? null : store.state.looks[view] ?? null);
+const lookOf = (view: string | null): Look | null => (view === null ? null : own(store.state.looks, view) ?? null);
 const linePlot = new LinePlot(store, pipelines, {
   frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier, () => dock.update());
@@ -428,12 +429,13 @@ part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
 store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
-  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held), sameJson);
+  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held),
+  (a, b) => a.held === b.held && sameJson(a.looks, b.looks) && sameJson(a.views, b.views));
 store.watch((state) => state.looks, (looks) => {
   kept.looks = looks;
   compare.update();
 });
-store.watch((state) => appliedOrders(state.orders), (marks) => history.setMarks(marks), sameJson);
+store.watch(appliedOrders, (marks) => history.setMarks(marks));
 
 part("skeleton").addEventListener("click", (event) => {
   const button = event.currentTarget as HTMLButtonElement;

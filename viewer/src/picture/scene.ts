@@ -18,6 +18,7 @@ import { cornersOf, probeNear, readProbe, weights } from "./probe";
 import type { Probe, ProbeReading } from "./probe";
 import { Ranges } from "./ranges";
 import type { Range } from "./ranges";
+import { own } from "../own";
 import { colourKey } from "../store/looks";
 import type { Look, Looks } from "../store/looks";
 import { THEMES } from "./theme";
@@ -161,7 +162,7 @@ export class Scene {
       this.pending.delete(name);
     }
     for (const { name, kind } of views) {
-      const look = looks[name];
+      const look = own(looks, name);
       if (!look) continue;
       const known = this.layers.get(name);
       const layer = known ?? new Layer(name, kind, look, this.renderer);

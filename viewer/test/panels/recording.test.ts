@@ -79,9 +79,9 @@ describe("the slider of a recording", () => {
     made.greet({ recording, orders: [done] });
     for (const view of ["a", "b"]) made.store.dispatch({ type: "frame", view, cycle: 500 });
     made.store.dispatch({ type: "order", status: order("o2", "applying", 490) });
-    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state.orders).map(({ cycle }) => cycle)]).toEqual([true, [5, 490]]);
+    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state).map(({ cycle }) => cycle)]).toEqual([true, [5, 490]]);
     made.greet({ recording, orders: [done] });
-    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state.orders).map(({ cycle }) => cycle)]).toEqual([false, [5]]);
+    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state).map(({ cycle }) => cycle)]).toEqual([false, [5]]);
     made.store.dispatch({ type: "frame", view: "a", cycle: 10 });
     expect(made.store.state.frames).toMatchObject({ count: 3, cycle: 10 });
     made.store.dispatch({ type: "frame", view: "b", cycle: 8 });
