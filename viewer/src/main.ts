@@ -11,12 +11,13 @@ import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
-import { History } from "./history/series";
+import { History, seriesKey } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
+import { own } from "./own";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -124,7 +125,7 @@ const selection = new Selection(store);
 const triad = new Triad();
 /** A field and its component in words. */
 const fieldTitle = (field: string | null, component: number): string =>
-  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, FIELD_TITLES[field ?? ""]);
+  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
 /** The unit of a field; null where none is given. */
 const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
@@ -132,7 +133,7 @@ const titleWithUnit = (field: string | null, component: number): string => withU
 let shownBars: Bar[] = [];
 const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
-    const look = store.state.looks[view];
+    const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
@@ -244,7 +245,7 @@ function contentOf(view: string): Content | null {
 }
 const monitored = new History();
 const history = new HistoryPlot(monitored, kept.dock.chosen, (chosen) => { kept.dock = { ...kept.dock, chosen }; });
-const lookOf = (view: string | null): Look | null => (view === null ? null : store.state.looks[view] ?? null);
+const lookOf = (view: string | null): Look | null => (view === null ? null : own(store.state.looks, view) ?? null);
 const linePlot = new LinePlot(store, pipelines, {
   frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier, () => dock.update());
@@ -271,7 +272,7 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
   },
   trouble: report,
 });
-const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
+const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
   history.choose(key);
   dock.choose(history);
 });
@@ -330,7 +331,7 @@ function takeMessage(message: ServerMessage): void {
       if (message.body.status === "applied") pipelines.answered(message.body.id);
       return store.dispatch({ type: "pipelines outcome", change: message.body });
     // The status shows what it has changed.
-    case "done": return;
+    case "done": return parameters.done(message.body.id);
     case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
     case "link": return void people.take(message.body);
@@ -345,7 +346,7 @@ function takeMessage(message: ServerMessage): void {
       return store.dispatch({ type: "end", end: message.body });
     case "error": {
       const { id, message: text } = message.body;
-      if (pipelines.answered(id)) void pipelines.told(-2);
+      if (pipelines.answered(id)) void pipelines.reload();
       if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
@@ -377,6 +378,10 @@ store.watch((state) => state.hello, (hello) => {
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
+  if (hello.monitors) {
+    monitors.keep(hello.monitors);
+    monitored.keep(hello.monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
+  }
   if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
 
@@ -429,12 +434,13 @@ part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
 store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
-  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held), sameJson);
+  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held),
+  (a, b) => a.held === b.held && sameJson(a.looks, b.looks) && sameJson(a.views, b.views));
 store.watch((state) => state.looks, (looks) => {
   kept.looks = looks;
   compare.update();
 });
-store.watch((state) => appliedOrders(state.orders), (marks) => history.setMarks(marks), sameJson);
+store.watch(appliedOrders, (marks) => history.setMarks(marks));
 
 part("skeleton").addEventListener("click", (event) => {
   const button = event.currentTarget as HTMLButtonElement;

@@ -1,8 +1,11 @@
 import { describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
+import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { appliedOrders } from "../../src/store/orders";
 import { runState, slowLink, whyNotSteering } from "../../src/store/run";
+import { Selection } from "../../src/store/selection";
 import { NO_PREVIEW } from "../../src/store/state";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../../src/store/verdict";
 import { STATUS, feature, page } from "../page";
@@ -159,6 +162,44 @@ describe("an earlier edit", () => {
     const orders = [order("a", { edits: [pinch(0.5)] }), order("b", { edits: [pinch(0.6)] }), order("c", { undo: 1 }), order("d", { edits: [pinch(0.7)] }), order("e", { stack: [pinch(0.7), pinch(0.4)] })];
     expect(provenance(orders, [pinch(0.7), pinch(0.4)]).map((known) => known?.id)).toEqual(["d", "e"]);
     expect(provenance(orders.slice(0, 2), [pinch(0.7)])).toEqual([null]);
+  });
+});
+
+describe("orders that have changed the shape", () => {
+  it("are the same list as long as there is no other in it", () => {
+    const { store } = page();
+    const tell = (id: string, status: "applying" | "applied", shape: number, cycle: number): void => store.dispatch({ type: "order", status: { id, status, shape, shapes: 2, cycle_applied: cycle, order: { edits: [pinch(0.5)] } } });
+    tell("a", "applying", 1, 5);
+    const list = appliedOrders(store.state);
+    expect(list).toEqual([{ cycle: 5, label: "Throat: height × 0.5" }]);
+    tell("a", "applied", 2, 5);
+    store.dispatch({ type: "frame", view: "v", cycle: 6 });
+    expect(appliedOrders(store.state)).toBe(list);
+    tell("b", "applying", 1, 9);
+    expect(appliedOrders(store.state).map(({ cycle }) => cycle)).toEqual([5, 9]);
+  });
+});
+
+describe("names that every object inherits", () => {
+  const NAMES = ["constructor", "toString", "valueOf", "__proto__"];
+
+  it("are views like others", () => {
+    const { store, greet } = page();
+    greet({ views: NAMES.map((name) => ({ name, kind: "slice" })), fields: [{ name: "p", association: "vertex", components: 1 }] });
+    for (const name of NAMES) expect(own(store.state.looks, name), name).toMatchObject({ visible: true, field: "p" });
+    for (const view of NAMES) store.dispatch({ type: "frame", view, cycle: 7 });
+    expect(store.state.frames).toMatchObject({ count: 4, cycle: 7 });
+    expect(store.state.chosenView).toBe("constructor");
+  });
+
+  it("are features like others", () => {
+    const { store, greet } = page();
+    greet({ features: NAMES.map((name) => feature(name, name === "valueOf" ? null : "inflow")) });
+    expect(chosen(store.state, "fixed")).toEqual(NAMES.filter((name) => name !== "valueOf"));
+    const selection = new Selection(store);
+    expect(selection.get("valueOf")).toBeNull();
+    selection.toggle("valueOf", "handle");
+    expect(chosen(store.state, "handle")).toEqual(["valueOf"]);
   });
 });
 
