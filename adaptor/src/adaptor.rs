@@ -61,6 +61,9 @@ use crate::{
     watch::Watch,
 };
 
+/// What is told of a command whose turn did not come.
+const TOO_LATE: &str = "the run ended before its turn came";
+
 /// Links a solver to its viewers and to the orders that change its shape.
 ///
 /// See the [crate's page](crate) for a whole solver.
@@ -89,6 +92,9 @@ pub struct Adaptor {
     waiting_changes: Vec<changing::WaitingChange>,
     /// How many changes of pipelines were made.
     changed: u64,
+    /// How many of the commands in the queue are in the checkpoint that was made since the last call;
+    /// `None` where none was made.
+    saved: Option<usize>,
     /// Whether the solver was told that the step to come does not look at its mesh and fields.
     is_spared: AtomicBool,
     /// Looks at the configuration's file.
@@ -125,6 +131,8 @@ struct Meetings {
     calls: u64,
     /// The fault of this rank since the last meeting.
     fault: Option<ExecuteError>,
+    /// The cycle of the last, where they do not come together at every call.
+    last: Option<u64>,
 }
 
 /// The part of `hello` that does not change from order to order.
@@ -286,11 +294,13 @@ impl Adaptor {
         }
         self.timing.cycles += 1;
         let moment = step.moment();
-        self.clock.set(moment.cycle, moment.time);
+        self.clock.set(moment);
         let fault = self.check(step, moment, channels).err();
         self.moment = moment;
         self.has_begun = true;
-        let moved = match self.meet(moment, fault, entered)? {
+        let met = self.meet(moment, fault, entered)?;
+        self.saved = None;
+        let moved = match met {
             Some((called, outside)) => {
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;
@@ -298,6 +308,9 @@ impl Adaptor {
                     // All ranks must know before a step begins whether a pipeline is due. The clock
                     // therefore counts from the next step on.
                     self.pipelines.tell(outside);
+                }
+                if self.skips_meetings() {
+                    self.note_meeting(moment.cycle);
                 }
                 moved
             }
@@ -381,17 +394,10 @@ impl Adaptor {
     pub fn finalize(mut self) -> Result<Report, FinalizeError> {
         let _alarm = Alarm::among(&self.communicator);
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
-            steerer.end(self.moment);
+            steerer.end(self.moment, self.saved.is_some());
         }
-        for Received { id, command, source, .. } in self.queue.take() {
-            let reason = "the run ended before its turn came";
-            match command {
-                Command::Order(_) => self.log.reject(&id, self.moment, &reason.into()),
-                // It ends, as was asked.
-                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
-                _ => self.log.settle(&id, &source, self.moment, Err(reason.into())),
-            }
-        }
+        self.end_changes();
+        self.end_queue();
         self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         self.mesh = SteeredMesh::Unknown;
         let asked = self.pipelines.end(self.moment, self.hub.as_ref());
@@ -402,6 +408,9 @@ impl Adaptor {
         }
         self.server = None;
         self.recorder = None;
+        // What the server has taken in until now has an outcome too.
+        self.log.wait();
+        self.end_queue();
         self.log.end(self.moment);
         let faults = self.pipelines.finish();
         // Rank 0 writes: what was asked for is there before any rank goes on.
@@ -425,6 +434,44 @@ impl Adaptor {
         }
     }
 
+    /// Tells of all commands in the queue that the run ended before their turn came.
+    fn end_queue(&mut self) {
+        for Received { id, command, source, .. } in self.queue.take() {
+            // The journal has what came after the checkpoint.
+            let goes_on = match &mut self.saved {
+                None => false,
+                Some(0) => self.log.has_journal(),
+                Some(left) => {
+                    *left -= 1;
+                    true
+                }
+            };
+            match command {
+                Command::Order(_) if goes_on => self.log.leave_open(&id),
+                Command::Order(_) => self.log.reject(&id, self.moment, &TOO_LATE.into()),
+                // It ends, as was asked.
+                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
+                // What they were for goes with this run.
+                Command::Pause {} | Command::Resume {} | Command::Cancel(_) => {
+                    self.end_command(&id, &source, false);
+                }
+                Command::Parameter(_) | Command::Pipelines(_) => {
+                    self.end_command(&id, &source, goes_on);
+                }
+            }
+        }
+    }
+
+    /// Tells of a command that is no order that the run ended before its turn came; whether a run
+    /// that goes on from the checkpoint carries it out.
+    fn end_command(&self, id: &str, source: &Source, goes_on: bool) {
+        if goes_on {
+            self.log.leave_command_open(id, source, self.moment);
+        } else {
+            self.log.settle(id, source, self.moment, Err(TOO_LATE.into()));
+        }
+    }
+
     /// Whether rank 0 was called to look at something; an error where any rank has one. `None`
     /// between two meetings of the ranks: then nothing is done, and a fault waits for the next, so
     /// that all ranks have it at the same call.
@@ -444,21 +491,40 @@ impl Adaptor {
         if self.communicator.size() == 1 {
             return fault.map_or(Ok(Some((called, outside))), Err);
         }
-        let due =
-            self.meetings.calls.is_multiple_of(u64::from(self.config.steering.poll_steps.get()));
+        let meets = self.meets();
         self.meetings.calls += 1;
         let fault = self.meetings.fault.take().or(fault);
-        // All ranks know alike of a motion under way; what only the step's own numbers could tell
-        // is left for the next meeting.
-        let under_way = self.paused
-            || !self.waiting_changes.is_empty()
-            || !self.resumed.is_over()
-            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest());
-        if !due && !under_way {
+        if !meets {
             self.meetings.fault = fault;
             return Ok(None);
         }
         meeting::meet(&*self.communicator, moment, fault, called, outside).map(Some)
+    }
+
+    /// Whether the ranks come together at the next call.
+    #[inline]
+    fn meets(&self) -> bool {
+        // All ranks know alike of a motion under way; what only the step's own numbers could tell
+        // is left for the next meeting.
+        self.communicator.size() == 1
+            || self.meetings.calls.is_multiple_of(self.config.steering.poll_steps.get().into())
+            || self.paused
+            || !self.waiting_changes.is_empty()
+            || !self.resumed.is_over()
+            || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest())
+    }
+
+    /// Whether there are calls at which the ranks do not come together.
+    #[inline]
+    fn skips_meetings(&self) -> bool {
+        self.communicator.size() > 1 && self.config.steering.poll_steps.get() > 1
+    }
+
+    /// Notes the cycle of a meeting, which all ranks were at: what falls due behind it and before the
+    /// next runs at the next. What a step between them says is of one rank alone.
+    fn note_meeting(&mut self, cycle: u64) {
+        self.meetings.last = Some(cycle);
+        self.pipelines.set_met(cycle);
     }
 
     /// Whether there is nothing to do in this call.

@@ -12,7 +12,6 @@ use tombolo_pipelines::{
 use crate::{
     lock::lock,
     steering::{Log, Queue, Received, Source},
-    step::Moment,
     stream::Clock,
 };
 
@@ -100,11 +99,9 @@ impl Changes {
     ) -> Result<String, Problem> {
         self.check(&change)?;
         make_absolute(&mut change);
-        let (cycle, time) = self.clock.get();
         let command = Command::Pipelines(change.clone());
         let reservation = self.queue.reserve(&command, bytes).map_err(come_back)?;
-        let id =
-            self.log.accept(id, &source, &command, Moment { cycle, time }).map_err(Problem::new)?;
+        let id = self.log.accept(id, &source, &command, self.clock.get()).map_err(Problem::new)?;
         lock(&self.state).under_way.push((id.clone(), Arc::new(change)));
         let reservation = Some(reservation);
         self.queue.push(Received { source, id: id.clone(), command, reservation });
@@ -132,7 +129,6 @@ impl Changes {
         }
         let mut change = change;
         make_absolute(&mut change);
-        let (cycle, time) = self.clock.get();
         let command = Command::Pipelines(change.clone());
         let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
             self.log.forget(&id);
@@ -147,7 +143,7 @@ impl Changes {
             command: command.clone(),
             reservation: Some(reservation),
         };
-        self.log.accept_from(client, id, &command, Moment { cycle, time }, move |is_taken| {
+        self.log.accept_from(client, id, &command, self.clock.get(), move |is_taken| {
             if is_taken {
                 changes.queue.push(received);
             } else {

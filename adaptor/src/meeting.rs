@@ -1,7 +1,7 @@
 //! The meeting of all ranks at the beginning of a call.
 
 use tombolo_deform::communicator::{Communicator, RankError, Reduction, first_failure};
-use tombolo_pipelines::language::{Command, parse_json};
+use tombolo_pipelines::language::Command;
 
 use crate::{
     error::ExecuteError,
@@ -96,16 +96,17 @@ pub(crate) fn share(
         Vec::new()
     };
     communicator.broadcast(0, &mut bytes);
-    // Every rank reads the same bytes, rank 0 too: what one cannot read, none obeys.
-    let text = std::str::from_utf8(&bytes)
-        .map_err(|error| format!("commands were lost between ranks: {error}"))?;
-    parse_json(text, "broadcast")
+    // Every rank reads the same bytes, rank 0 too: what one cannot read, none obeys. Each command was
+    // within its limits when it came in, and many together may be over those of one.
+    serde_json::from_slice(&bytes)
         .map_err(|error| format!("commands were lost between ranks: {error}"))
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
     use tombolo_deform::communicator::threads;
+    use tombolo_pipelines::{language::parse_json, limits::VALUES};
 
     use super::*;
 
@@ -162,5 +163,24 @@ mod tests {
                 .to_string()
         });
         assert!(said.iter().all(|said| said.contains("from 0.25 to 0.5")), "{said:?}");
+    }
+
+    #[test]
+    fn commands_that_are_more_than_one_document_reach_all_ranks() {
+        // Each is allowed, five values for each vertex; together they are more than one text may have.
+        let vertices: Vec<usize> = (0..VALUES.most / 9).collect();
+        let values = vec![[0.0; 3]; vertices.len()];
+        let edit = json!({"displacement": {"vertices": vertices, "values": values}});
+        let order = json!({"order": {"edits": [edit]}}).to_string();
+        let shared = threads::run(2, |ranks| {
+            let waiting = ["1", "2"].map(|id| (id, order.as_str()));
+            let waiting = waiting.into_iter().chain([("3", r#"{"stop": {}}"#)]);
+            let waiting = waiting
+                .map(|(id, text)| (id.to_owned(), parse_json::<Command>(text, "message").unwrap()));
+            let own = if ranks.rank() == 0 { waiting.collect() } else { Vec::new() };
+            let shared = share(&ranks, own).unwrap();
+            (shared.len(), matches!(shared.last(), Some((_, Command::Stop {}))))
+        });
+        assert_eq!(shared, [(3, true); 2]);
     }
 }

@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::{
     recording::{HEAD, Head, Kind, MAGIC, RecordError, read_head, write},
+    step::Moment,
     stream::{EXACT, Hub, Observed, Observer},
 };
 
@@ -182,7 +183,8 @@ impl Writing {
     }
 
     fn put(&mut self, kind: Kind, view: u32, message: &[u8]) -> Result<(), String> {
-        let written = self.out.put(kind, view, self.hub.clock.get(), message);
+        let Moment { cycle, time } = self.hub.clock.get();
+        let written = self.out.put(kind, view, (cycle, time), message);
         let bytes = written.map_err(|error| error.to_string())?;
         if bytes > self.most_bytes {
             self.out.flush().map_err(|error| error.to_string())?;

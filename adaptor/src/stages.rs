@@ -65,12 +65,13 @@ pub(crate) struct Asked {
     pub(crate) faults: Vec<String>,
 }
 
-/// The names of the pipelines that a change has changed.
-#[derive(Debug, serde::Serialize)]
+/// The names of the pipelines that a change has changed, and the frames of its trial.
+#[derive(Debug)]
 pub(crate) struct Changed {
     pub(crate) added: Vec<String>,
     pub(crate) replaced: Vec<String>,
     pub(crate) removed: Vec<String>,
+    pub(crate) frames: Vec<Frame>,
 }
 
 impl Pipelines {
@@ -144,17 +145,16 @@ impl Pipelines {
             added: next.added().to_vec(),
             replaced: next.replaced().to_vec(),
             removed: next.removed().to_vec(),
+            frames: next.take_frames(),
         };
         let (kept, gone) = std::mem::take(&mut self.views)
             .into_iter()
             .partition::<Vec<_>, _>(|view| next.keeps(&view.name));
         self.views = kept;
-        let frames = next.take_frames();
         self.runner.replace(next, channels);
         self.describe(config);
         if let Some(hub) = hub {
             gone.iter().for_each(|view| hub.forget(view.number));
-            frames.into_iter().for_each(|frame| self.send(frame, hub));
             hub.costs(self.runner.costs());
         }
         Ok(changed)
@@ -247,6 +247,12 @@ impl Pipelines {
         self.runner.tell(outside.seconds, outside.viewers);
     }
 
+    /// Says that pipelines could run last at this cycle, where they cannot at every step.
+    #[inline]
+    pub(crate) fn set_met(&mut self, cycle: u64) {
+        self.runner.set_met(cycle);
+    }
+
     /// The cost and the monitors of each pipeline.
     pub(crate) fn reports(&self) -> Vec<PipelineReport> {
         let report = |(name, cost): (&str, Cost)| {
@@ -337,7 +343,7 @@ impl Pipelines {
     }
 
     /// Hands a frame to the encoder's thread.
-    fn send(&self, frame: Frame, hub: &Hub) {
+    pub(crate) fn send(&self, frame: Frame, hub: &Hub) {
         let Some(view) = self.views.iter().find(|view| *view.name == *frame.pipeline) else {
             return;
         };

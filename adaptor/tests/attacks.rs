@@ -394,6 +394,24 @@ fn the_driver_has_a_place_when_all_others_are_taken() {
     all_is_well(&mut solver);
 }
 
+/// Nothing that is longer than what it may say at all is even held in memory.
+#[test]
+fn one_who_watches_sends_no_long_messages() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let as_watcher = format!("{}&role=watch", socket_url(&solver.adaptor));
+    for url in [watching_url(&solver.adaptor), as_watcher] {
+        let mut watcher = Viewer::try_connect(&url).expect("let in");
+        watcher.hello();
+        // One that is read, and refused.
+        watcher.send_text(&" ".repeat(60 << 10));
+        let told = watcher.wait_for("error", |_| true);
+        assert!(told["message"].as_str().unwrap().contains("watches"), "{told}");
+        watcher.send_unwelcome(Message::text(" ".repeat(70 << 10)));
+        watcher.wait_for_end();
+    }
+    all_is_well(&mut solver);
+}
+
 #[test]
 fn a_new_connection_is_no_way_around_the_limit_of_messages() {
     let mut solver = Solver::with_config(LINK_TO_ALL);

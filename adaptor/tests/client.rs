@@ -267,6 +267,27 @@ fn a_lost_connection_is_made_again_and_an_order_is_given_once() {
     assert_eq!(run.end().orders.len(), 3);
 }
 
+#[test]
+fn a_closed_client_has_let_go_of_the_wheel_while_it_is_still_there() {
+    let run = Run::new(MONITORED);
+    let first = Client::connect(&run.link, &Options::default()).expect("connected");
+    first.drive(PATIENCE).expect("the wheel");
+    first.close();
+    first.close();
+    assert_eq!(first.pause(), Err(ClientError::Closed));
+    let second = Client::connect(&run.link, &Options::default()).expect("connected");
+    second.drive(PATIENCE).expect("the wheel");
+    let over = loop {
+        match first.next(PATIENCE) {
+            Ok(Some(_)) => {}
+            other => break other.map(drop),
+        }
+    };
+    assert_eq!(over, Err(ClientError::Closed));
+    drop(second);
+    run.end();
+}
+
 /// What listens answers each connection so, and is asked by a client.
 fn answered_by(answer: &'static [u8]) -> ClientError {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");

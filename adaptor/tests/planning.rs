@@ -5,7 +5,7 @@ mod common;
 
 use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
-use tombolo::{OrderStatus, Settings};
+use tombolo::{OrderStatus, Settings, pipelines::language::parse_orders};
 
 /// A run whose long orders take seconds.
 fn solver() -> Solver {
@@ -91,6 +91,21 @@ fn a_stop_does_not_wait_for_shapes() {
         assert!(reason.contains("given up") || reason.contains("the run ended"), "{reason}");
     }
     assert_eq!(report.orders.len(), 2);
+}
+
+#[test]
+fn a_stop_gives_shapes_up_where_nobody_watches() {
+    let orders = json!([{"at": {"cycle": 1}, "order": long(0.3)}]).to_string();
+    let orders = parse_orders(&orders, "orders.json").unwrap();
+    let mut solver = Solver::of_box([24, 24, 24], Settings { orders, ..Settings::default() });
+    solver.step();
+    solver.adaptor.stopper().stop();
+    solver.step();
+    assert!(solver.stopped && solver.motions.is_empty());
+    let report = solver.finish();
+    let order = &report.orders[0];
+    assert_eq!(order.status, OrderStatus::Rejected);
+    assert!(order.reason.as_deref().unwrap().contains("given up"), "{order:?}");
 }
 
 #[test]

@@ -208,6 +208,43 @@ fn ranks_come_together_as_often_as_they_are_told() {
     }
 }
 
+/// Also where a rank is shown another cycle between them, which is told at none.
+#[test]
+fn steps_that_fall_due_between_two_meetings_run_at_the_next() {
+    let text = r#"{"version": 1, "steering": {"poll_steps": 10}, "pipelines": [
+        {"name": "rare", "every": {"steps": 10}, "stages": [{"quality": {}}]},
+        {"name": "rarer", "every": {"steps": 30}, "stages": [{"quality": {}}]}]}"#;
+    let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
+    let output = tempfile::tempdir().expect("a directory");
+    let file = output.path().join("run.checkpoint");
+    let run = |cycles: std::ops::Range<u64>, restarts: bool| {
+        threads::run(RANKS, |ranks| {
+            let rank = ranks.rank();
+            let part = part(&mesh, rank);
+            let settings = Settings { config: config(text), ..Settings::default() };
+            let settings = settings.on(Arc::new(ranks));
+            let settings = if restarts { settings.restart_from_file(&file) } else { settings };
+            let mut adaptor = settings.start().expect("set up");
+            let channels = [Channel { name: "fluid", mesh: part.view(), fields: &[] }];
+            for cycle in cycles.clone() {
+                let shown = if rank == 1 && [10, 20].contains(&cycle) { cycle + 1 } else { cycle };
+                adaptor.execute(&step(shown), &channels).expect("a step");
+            }
+            adaptor.write_checkpoint(&file).expect("saved");
+            ["rare", "rarer"].map(|name| {
+                let history = adaptor.history(name).expect("a pipeline");
+                history.measured().map(|measured| measured.cycle).collect::<Vec<u64>>()
+            })
+        })
+    };
+    let outcomes = run(1..45, false);
+    assert_eq!(outcomes, vec![[vec![11, 21, 31, 41], vec![31]]; RANKS]);
+    // A run that goes on has not forgotten what fell due before.
+    run(1..31, false);
+    let outcomes = run(31..45, true);
+    assert_eq!(outcomes, vec![[vec![11, 21, 31, 41], vec![31]]; RANKS]);
+}
+
 /// A rank whose mesh makes no sense takes no other with it: the error is named, with its rank, and
 /// the run goes on.
 #[test]

@@ -153,4 +153,9 @@ fn viewers_go_through_a_recording() {
     assert!(viewer.decoded().is_empty());
     viewer.send(&json!({"play": {"seek": {"cycle": 0}, "paused": false, "speed": 100}}));
     viewer.wait_for("play", |play| play["at_end"] == true);
+    // Who says much that is wrong is told no more of it than there is room for.
+    (0..2000).for_each(|_| viewer.send_text("{}"));
+    viewer.look_for("nothing", Duration::from_millis(600), |_| true);
+    let errors = viewer.seen.iter().filter(|told| told.get("error").is_some()).count();
+    assert!((1..1500).contains(&errors), "{errors} errors");
 }

@@ -511,6 +511,20 @@ fn an_answer_may_take_longer_than_a_request() {
 }
 
 #[test]
+fn a_run_that_comes_back_has_one_connection() {
+    let here = Here::new(None);
+    let first = r#"{"version": 1, "name": "again", "instance": "0123456789abcdef"}"#;
+    let mut lost = here.attach(first);
+    for _ in 0..100 {
+        let mut back = here.attach(first);
+        back.read().expect("taken in");
+        until("the end of it", || lost.read().map_or(true, |said| said.is_close()));
+        lost = back;
+    }
+    assert_eq!(here.names(), ["again"]);
+}
+
+#[test]
 fn half_requests_and_rubbish_keep_nobody_out() {
     let here = Here::new(None);
     let run = here.run("nozzle");

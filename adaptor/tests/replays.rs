@@ -2,12 +2,16 @@
 
 mod common;
 
-use std::path::Path;
+use std::{path::Path, time::Duration};
 
 use common::{Solver, Viewer, bits, config, squeeze};
 use fastrand::Rng;
 use serde_json::{Value, json};
-use tombolo::{OrderStatus, Settings, pipelines::language::parse_journal};
+use tokio_tungstenite::tungstenite::Message;
+use tombolo::{
+    OrderReport, OrderStatus, Settings,
+    pipelines::language::{parse_journal, parse_orders},
+};
 
 /// A pipeline gives orders too, and viewers look on.
 const CONFIGURATION: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": [
@@ -76,13 +80,13 @@ fn random_run(seed: u64, output: &Path) -> (Trace, String, Vec<String>) {
             sent += 1;
             if random.u64(..2) == 0 {
                 // Sometimes what was sent has come in before the next step, and sometimes not.
-                viewer.look_for("order", std::time::Duration::from_millis(5), |_| false);
+                viewer.look_for("order", Duration::from_millis(5), |_| false);
             }
         }
         step(&mut solver, &mut trace);
-        std::thread::sleep(std::time::Duration::from_micros(random.u64(..3000)));
+        std::thread::sleep(Duration::from_micros(random.u64(..3000)));
     }
-    while viewer.look_for("nothing", std::time::Duration::from_millis(1), |_| true).is_some() {}
+    while viewer.look_for("nothing", Duration::from_millis(1), |_| true).is_some() {}
     let accepted = |message: &Value| {
         let order = message.get("order")?;
         (order["status"] == "accepted").then(|| order["id"].as_str().unwrap().to_owned())
@@ -167,6 +171,35 @@ fn what_waits_at_the_end_is_not_carried_out_again() {
     assert!(again.last().unwrap().0 == mesh, "{journal}");
 }
 
+/// Orders that come in while the run ends are the last that the server takes.
+#[test]
+fn what_is_accepted_while_a_run_ends_has_an_outcome() {
+    for _ in 0..10 {
+        let output = tempfile::tempdir().unwrap();
+        let mut solver = Solver::new(settings(output.path()));
+        let mut viewer = Viewer::connect(&solver.adaptor);
+        viewer.hello();
+        solver.step();
+        let sending = std::thread::spawn(move || {
+            for sent in 0..35 {
+                let message = json!({"id": format!("m{sent}"), "order": squeeze(0.01)});
+                viewer.send_unwelcome(Message::text(message.to_string()));
+                std::thread::sleep(Duration::from_micros(200));
+            }
+        });
+        let orders = solver.finish().orders;
+        sending.join().unwrap();
+        let is_open = |order: &&OrderReport| order.status == OrderStatus::Accepted;
+        assert_eq!(orders.iter().find(is_open), None);
+        let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+        for order in orders.iter().filter(|order| order.id.starts_with('m')) {
+            let rejected = format!("{{\"id\":\"{}\",\"status\":\"rejected\"", order.id);
+            assert_eq!(journal.matches(&rejected).count(), 1, "{order:?} in {journal}");
+        }
+        assert!(journal.lines().last().unwrap().starts_with("{\"end\":"), "{journal}");
+    }
+}
+
 #[test]
 fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     let output = tempfile::tempdir().unwrap();
@@ -186,7 +219,7 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     first["order"]["schedule"] = json!({"steps": 40, "every": {"steps": 2}});
     viewer.send(&first);
     let moves = |order: &Value| order["id"] == "first" && order["status"] == "applying";
-    while viewer.look_for("order", std::time::Duration::from_millis(2), moves).is_none() {
+    while viewer.look_for("order", Duration::from_millis(2), moves).is_none() {
         step(&mut solver, &mut trace);
     }
     viewer.send(&order("second", 0.2, None));
@@ -208,7 +241,7 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     let all = ["first", "second", "third", "better", "late", "lost"];
     while !all.iter().all(|id| ended.contains_key(*id)) {
         step(&mut solver, &mut trace);
-        let wait = std::time::Duration::from_millis(1);
+        let wait = Duration::from_millis(1);
         while let Some(order) = viewer.look_for("order", wait, is_over) {
             ended.insert(order["id"].as_str().unwrap().to_owned(), order);
         }
@@ -227,6 +260,57 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
     let again = replay(&journal, trace.len());
     assert!(again == trace, "the replay differs");
+    // As a file of orders it is for a run in which nothing waits that could be replaced.
+    let output = tempfile::tempdir().unwrap();
+    let orders = parse_orders(&journal, "journal.jsonl").unwrap();
+    let mut other = Solver::new(Settings { orders, ..settings(output.path()) });
+    other.steps(trace.len() as u64);
+    let orders = other.finish().orders;
+    for id in ["first", "better", "third"] {
+        let order = orders.iter().find(|order| order.id == id).unwrap();
+        assert_ne!(order.status, OrderStatus::Rejected, "{order:?}");
+    }
+}
+
+/// In the run and in its replay, what has no name of its own is counted from `o1`.
+#[test]
+fn a_command_of_a_replay_has_its_name_whatever_is_said_before_it() {
+    const CONFIGURATION: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"},
+        "journal": "journal.jsonl", "pipelines": []}"#;
+    let settings = |output: &Path| Settings {
+        config: config(CONFIGURATION),
+        output: output.into(),
+        ..Settings::default()
+    };
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(settings(output.path()));
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.steps(50);
+    viewer.send(&json!({"order": squeeze(0.2)}));
+    let order = solver.step_until_told(&mut viewer, "order", |order| order["status"] == "applied");
+    assert_eq!(order["id"], "o1");
+    let (cycles, mesh) = (solver.cycle, bits(&solver.mesh));
+    solver.finish();
+    let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+    let again = tempfile::tempdir().unwrap();
+    let replay = Some(parse_journal(&journal, "journal.jsonl").unwrap());
+    let mut replayed = Solver::new(Settings { replay, ..settings(again.path()) });
+    let mut viewer = Viewer::connect(&replayed.adaptor);
+    viewer.hello();
+    viewer.send(&json!({"pause": {}}));
+    viewer.send(&json!({"resume": {}}));
+    // A refused message is answered too: what was sent before it has come in.
+    viewer.send(&json!({"id": "o1", "resume": {}}));
+    let error = viewer.wait_for("error", |error| error["id"] == "o1");
+    assert!(error["message"].as_str().unwrap().contains("another command"), "{error}");
+    replayed.step();
+    let done = viewer.wait_for("done", |_| true);
+    assert_eq!(done["id"], "o2");
+    replayed.steps(cycles - 1);
+    assert!(bits(&replayed.mesh) == mesh, "{journal}");
+    let orders = replayed.finish().orders;
+    assert!(orders.len() == 1 && orders[0].id == "o1", "{orders:?}");
 }
 
 #[test]

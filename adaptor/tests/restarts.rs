@@ -294,6 +294,24 @@ fn several_ranks_go_on_from_one_file() {
 }
 
 #[test]
+fn a_restart_that_only_some_ranks_were_given_is_refused_on_all() {
+    let output = tempfile::tempdir().unwrap();
+    for given in [[Some("a"), None], [None, Some("a")], [Some("a"), Some("b")]] {
+        let said = threads::run(2, |ranks| {
+            let file = given[ranks.rank()].map(|name| output.path().join(name));
+            let settings = Settings::default().on(Arc::new(ranks));
+            let settings = match file {
+                Some(file) => settings.restart_from_file(file),
+                None => settings,
+            };
+            settings.start().map(drop).unwrap_err().to_string()
+        });
+        assert_eq!(said[0], said[1]);
+        assert!(said[0].contains("rank 1: it is to go on from another checkpoint"), "{said:?}");
+    }
+}
+
+#[test]
 fn another_mesh_or_file_is_refused() {
     let output = tempfile::tempdir().unwrap();
     let orders = parse_orders(ORDERS, "orders.json").unwrap();
@@ -344,4 +362,109 @@ fn what_a_restart_is_given_anew_takes_the_place_of_what_was() {
     // That of the pipeline at its first step, which was under way.
     let orders = again.finish().orders;
     assert!(orders.len() == 1 && orders[0].status == OrderStatus::Applied, "{orders:?}");
+}
+
+/// The settings of a run whose orders come from viewers alone.
+fn steered(output: &Path) -> Settings {
+    let text = r#"{"version": 1, "journal": "journal.jsonl", "stream": {"listen": "127.0.0.1:0"},
+        "pipelines": [{"name": "shape", "on": "order", "stages": [{"schedule": {"steps": 3}}]}]}"#;
+    let settings = Settings { config: config(text), output: output.into(), ..Settings::default() };
+    settings.parameter("heating", 1.0, 0.0..=2.0)
+}
+
+/// Has two orders in the steerer, and one more and a parameter in the queue.
+fn let_wait(solver: &mut Solver, trace: &mut Trace) {
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    step(solver, trace);
+    let accepted = |viewer: &mut Viewer, id: &str| {
+        viewer.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
+    };
+    viewer.send(&json!({"id": "a", "order": squeeze(0.1)}));
+    viewer.send(&json!({"id": "b", "order": squeeze(0.1)}));
+    accepted(&mut viewer, "b");
+    step(solver, trace);
+    viewer.send(&json!({"id": "p", "parameter": {"name": "heating", "value": 1.5}}));
+    viewer.send(&json!({"id": "c", "order": squeeze(0.1)}));
+    accepted(&mut viewer, "c");
+}
+
+/// A run that is stopped by a signal saves its state and ends well. What waits then is carried out by
+/// the run that goes on from there, once.
+#[test]
+fn what_waits_when_a_run_saves_its_state_and_ends_is_carried_out_by_the_next() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("journal.jsonl");
+    let mut trace = Trace::new();
+    let mut solver = Solver::new(steered(output.path()));
+    let_wait(&mut solver, &mut trace);
+    let checkpoint = solver.adaptor.checkpoint();
+    let (saved, mesh) = (solver.cycle, solver.mesh.clone());
+    let orders = solver.finish().orders;
+    assert_eq!(orders.len(), 3, "{orders:?}");
+    for order in &orders {
+        assert_eq!(order.status, OrderStatus::Rejected, "{order:?}");
+        let reason = order.reason.as_deref().unwrap_or_default();
+        assert!(reason.contains("goes on from its checkpoint"), "{order:?}");
+    }
+    let journal = std::fs::read_to_string(&file).unwrap();
+    assert!(!journal.contains("\"rejected\""), "{journal}");
+    assert!(parse_journal(&journal, "journal.jsonl").unwrap().commands.is_empty(), "{journal}");
+    let mut again = Solver::new(steered(output.path()).restart(checkpoint));
+    (again.mesh, again.cycle) = (mesh, saved);
+    while again.adaptor.orders().iter().any(|order| order.status != OrderStatus::Applied) {
+        assert!(trace.len() < 100_000, "{:?}", again.adaptor.orders());
+        step(&mut again, &mut trace);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(again.adaptor.parameter("heating"), Some(1.5));
+    let ids: Vec<String> = again.finish().orders.into_iter().map(|order| order.id).collect();
+    assert_eq!(ids, ["a", "b", "c"]);
+    let journal = std::fs::read_to_string(&file).unwrap();
+    let recording = parse_journal(&journal, "journal.jsonl").unwrap();
+    assert_eq!(recording.commands.len(), 4, "{journal}");
+    let output = tempfile::tempdir().unwrap();
+    let mut replayed = Solver::new(Settings { replay: Some(recording), ..steered(output.path()) });
+    let mut found = Trace::new();
+    (0..trace.len()).for_each(|_| step(&mut replayed, &mut found));
+    assert_same(&found, &trace, 0, &format!("replayed:\n{journal}"));
+}
+
+#[test]
+fn what_waits_when_a_run_ends_and_no_checkpoint_has_it_is_rejected() {
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(steered(output.path()));
+    let _ = solver.adaptor.checkpoint();
+    let_wait(&mut solver, &mut Trace::new());
+    let orders = solver.finish().orders;
+    assert!(orders.iter().all(|order| order.status == OrderStatus::Rejected), "{orders:?}");
+    let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+    for id in ["a", "b", "c", "p"] {
+        let rejected = format!("{{\"id\":\"{id}\",\"status\":\"rejected\"");
+        assert_eq!(journal.matches(&rejected).count(), 1, "{id} in {journal}");
+    }
+}
+
+/// Without a journal nobody knows of what came after the checkpoint.
+#[test]
+fn without_a_journal_only_what_is_in_the_checkpoint_is_said_to_go_on() {
+    let output = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": []}"#;
+    let settings = Settings { config: config(text), ..steered(output.path()) };
+    let mut solver = Solver::new(settings);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step();
+    let send = |viewer: &mut Viewer, id: &str| {
+        viewer.send(&json!({"id": id, "order": squeeze(0.1)}));
+        viewer.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
+    };
+    send(&mut viewer, "before");
+    let _ = solver.adaptor.checkpoint();
+    send(&mut viewer, "after");
+    let goes_on = |order: &tombolo::OrderReport| {
+        order.reason.as_deref().is_some_and(|reason| reason.contains("goes on"))
+    };
+    let orders = solver.finish().orders;
+    assert_eq!(orders.iter().map(goes_on).collect::<Vec<_>>(), [true, false], "{orders:?}");
 }

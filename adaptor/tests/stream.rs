@@ -777,6 +777,40 @@ fn who_came_and_left_stands_in_the_journal() {
     assert!(lines.iter().any(|line| line["refused"]["address"] == "127.0.0.1"), "{journal}");
 }
 
+#[test]
+fn one_who_watches_cannot_make_the_journal_grow_without_end() {
+    let directory = tempfile::tempdir().unwrap();
+    let text =
+        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
+    let mut solver = Solver::new(Settings {
+        config: config(&text),
+        output: directory.path().into(),
+        ..Settings::default()
+    });
+    solver.step();
+    let link = solver.adaptor.watching_link().unwrap();
+    let watching = link.replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);
+    let begun = Instant::now();
+    for _ in 0..150 {
+        let mut watcher = Viewer::try_connect(&watching).unwrap();
+        watcher.hello();
+    }
+    let mut driver = Viewer::connect(&solver.adaptor);
+    driver.wait_for("status", |status| status["viewers"] == 1);
+    let seconds = begun.elapsed().as_secs();
+    solver.finish();
+    let journal = std::fs::read_to_string(directory.path().join("run.jsonl")).unwrap();
+    let lines = journal.lines().map(|line| serde_json::from_str(line).unwrap());
+    let of_viewers: Vec<Value> =
+        lines.filter(|line: &Value| line.get("viewer").is_some()).collect();
+    let (of_drivers, of_watchers): (Vec<_>, Vec<_>) =
+        of_viewers.iter().partition(|line| line["viewer"]["may_drive"] == true);
+    assert!(of_watchers.len() as u64 <= 101 + seconds / 10, "{}", of_watchers.len());
+    // Nobody keeps the lines about the others out.
+    assert_eq!(of_drivers.len(), 2, "{of_drivers:?}");
+    parse_journal(&journal, "run.jsonl").unwrap();
+}
+
 mod any_bytes {
     use super::*;
     use proptest::{prelude::*, strategy::ValueTree};

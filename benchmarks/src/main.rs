@@ -15,6 +15,7 @@
 //! cargo run --release -p tombolo-benchmarks -- extract --json
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
 //! cargo run --release -p tombolo-benchmarks -- python --json
+//! cargo run --release -p tombolo-benchmarks -- stream --json
 //! cargo run --release -p tombolo-benchmarks -- service --json
 //! cargo run --release -p tombolo-benchmarks -- volume --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume-ranks --json
@@ -36,6 +37,7 @@ mod service;
 mod service_viewers;
 mod skeleton;
 mod stiffening;
+mod stream;
 mod surface;
 mod surface_wasm;
 mod untangle;
@@ -116,6 +118,8 @@ enum Name {
     Viewer,
     /// The cost of `execute` from Python when nothing is due, and the memory that lending a mesh takes.
     Python,
+    /// Streaming a surface from a solver in Python to another process, beside Rerun.
+    Stream,
     /// Many viewers, slow ones and deaf ones; many and large orders; how soon the mesh moves.
     Service,
     /// The time and the memory of an order, from ten thousand cells to five million.
@@ -150,6 +154,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "distributed")]
         Name::VolumeRanks => text(volume_ranks::run(), json),
         Name::Python => text(python::run(), json),
+        Name::Stream => text(stream::run(), json),
         Name::Service => text(service::run(arguments.short), json),
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),

@@ -169,7 +169,8 @@ fn measured(
         let stack: Vec<Edit> = serde_json::from_value(edits(amount))?;
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
         let bare = Deformation::from(Deform { improve: 0, ..Deform::default() });
-        let one_solve = figures(&mesh, &shaper.target(&stack, &bare, SurfaceRule::Allow)?.points);
+        let allowing = Guard { surface: SurfaceRule::Allow, ..guard };
+        let one_solve = figures(&mesh, &shaper.target(&stack, &bare, &allowing)?.points);
         let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
         let reference = Arc::clone(shaper.reference());
         let start = Instant::now();

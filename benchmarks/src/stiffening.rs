@@ -71,6 +71,7 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
         let stack: Vec<Edit> = serde_json::from_value(edits)?;
         let guard =
             Guard { min_scaled_jacobian: 0.0, otherwise: Otherwise::Untangle, ..Guard::default() };
+        let allowing = Guard { surface: SurfaceRule::Allow, ..guard };
         for exponent in EXPONENTS {
             let deform = Deformation::from(Deform {
                 stiffening: exponent,
@@ -78,8 +79,7 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
                 ..Deform::default()
             });
             let mut shaper = Shaper::new(Arc::clone(&mesh), Arc::clone(&surface))?;
-            let one_solve =
-                figures(&mesh, &shaper.target(&stack, &deform, SurfaceRule::Allow)?.points);
+            let one_solve = figures(&mesh, &shaper.target(&stack, &deform, &allowing)?.points);
             let (mut followed, mut sub_steps, mut rejected) = (None, 0, None);
             if one_solve.inverted > 0 {
                 let start = Arc::clone(shaper.reference());

@@ -40,8 +40,6 @@ pub(crate) struct Configuration {
     pub(crate) file: Option<PathBuf>,
     /// The checkpoint that the run goes on from.
     pub(crate) restart: Option<String>,
-    /// The Fortran handle of the communicator.
-    pub(crate) communicator: Option<i32>,
     /// Requests that are not carried out, for the log.
     pub(crate) notes: Vec<String>,
 }
@@ -65,7 +63,7 @@ impl Configuration {
     /// default.
     pub(crate) fn read(root: &Node<'_, '_>) -> Result<Self, RunError> {
         let mut found = Found::default();
-        let (mut parameters, mut communicator, mut orders) = (Vec::new(), None, Vec::new());
+        let (mut parameters, mut orders) = (Vec::new(), Vec::new());
         let mut restart = variable(RESTART);
         if let Some(catalyst) = root.child(c"catalyst") {
             if let Some(scripts) = catalyst.child(c"scripts") {
@@ -79,11 +77,6 @@ impl Configuration {
             }
             if let Some(file) = catalyst.child(c"restart") {
                 restart = Some(file.text()?.into_owned());
-            }
-            if let Some(handle) = catalyst.child(c"mpi_comm") {
-                let expected = "the Fortran handle of a communicator";
-                let value = i32::try_from(handle.integer(expected)?);
-                communicator = Some(value.map_err(|_| handle.wrong(expected))?);
             }
         }
         let mut of_user = None;
@@ -110,10 +103,18 @@ impl Configuration {
             output: variable(OUTPUT).map_or_else(|| PathBuf::from("."), PathBuf::from),
             file,
             restart,
-            communicator,
             notes: found.notes,
         })
     }
+}
+
+/// The Fortran handle of the communicator that the node of `catalyst_initialize` names.
+pub(crate) fn communicator(root: &Node<'_, '_>) -> Result<Option<i32>, RunError> {
+    let Some(catalyst) = root.child(c"catalyst") else { return Ok(None) };
+    let Some(handle) = catalyst.child(c"mpi_comm") else { return Ok(None) };
+    let expected = "the Fortran handle of a communicator";
+    let value = i32::try_from(handle.integer(expected)?);
+    value.map(Some).map_err(|_| handle.wrong(expected))
 }
 
 fn variable(name: &str) -> Option<String> {

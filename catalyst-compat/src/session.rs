@@ -32,9 +32,8 @@ enum Stage {
 impl Session {
     /// Sets a run up. Collective.
     pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, RunError> {
-        let configuration = Configuration::read(node);
-        let handle =
-            configuration.as_ref().ok().and_then(|configuration| configuration.communicator);
+        // First, and by itself: what else is wrong on one rank is told by the communicator of all.
+        let handle = configuration::communicator(node)?;
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live
         // communicator.
         let communicator = unsafe { ranks::communicator(handle) }?;
@@ -48,8 +47,7 @@ impl Session {
             file,
             restart,
             notes,
-            ..
-        } = ranks::agree(&*communicator, configuration)?;
+        } = ranks::agree(&*communicator, Configuration::read(node))?;
         let settings = Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -126,7 +124,8 @@ impl Session {
             Stage::UnderWay(run) => {
                 let checkpoint = checkpoint_file(node);
                 run.execute(given).map_err(at_path)?;
-                let checkpoint = ranks::agree(&*self.communicator, checkpoint)?;
+                let path = "catalyst/state/checkpoint";
+                let checkpoint = ranks::agree_on(&*self.communicator, checkpoint, path)?;
                 checkpoint.map_or(Ok(()), |file| run.checkpoint(&file))
             }
             Stage::Waiting { .. } => Ok(()),

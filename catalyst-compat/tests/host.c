@@ -89,6 +89,10 @@ int main(int argc, char** argv)
   clear(&setup);
   text(&setup, "catalyst/mpi_comm", "world");
   expect("a communicator in words", impl->initialize(&setup), 100);
+  /* By the communicator the ranks are told what else is wrong, so that it is read first. */
+  text(&setup, "catalyst/pipelines/0/type", "oi");
+  text(&setup, "catalyst/pipelines/0/filename", "x.vtu");
+  expect("a communicator in words and a pipeline of an unknown type", impl->initialize(&setup), 100);
   expect("what failed did not initialize", impl->execute(&empty), 1);
   expect("initialize", impl->initialize(&empty), 0);
   expect("a second initialize", impl->initialize(&empty), 0);

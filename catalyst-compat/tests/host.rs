@@ -88,6 +88,7 @@ fn whatever_is_wrong_is_told_with_its_path() {
     ] {
         assert!(errors.contains(told), "'{told}' is not in:\n{errors}");
     }
+    assert_eq!(errors.matches("'catalyst/mpi_comm': found").count(), 2, "{errors}");
     assert!(!errors.contains("defect"), "{errors}");
 }
 

@@ -502,7 +502,10 @@ class TomboloOrder(_Algorithm):
             surface = connected.surface
             if surface is None:
                 raise tombolo.MeshError("the run: found no surface yet, expected that which points were moved from")
-            moved = vtk.points(data) - surface.points[np.searchsorted(surface.vertices, vertices)]
+            at = np.searchsorted(surface.vertices, vertices).clip(max=len(surface.vertices) - 1)
+            if not np.array_equal(surface.vertices[at], vertices):
+                raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
+            moved = vtk.points(data) - surface.points[at]
         kept = np.flatnonzero(np.any(moved != 0, axis=1))
         return [{"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}]
 

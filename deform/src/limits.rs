@@ -74,9 +74,9 @@ pub const FORMULA_DEPTH: Limit =
     limit("levels of nesting", 200, "the parentheses of a formula or condition");
 /// Edits of an order, and of the stack that it makes.
 pub const EDITS: Limit = limit("edits", 1 << 14, "an order, and the stack that it makes");
-/// Vertices and faces that edits list. So many displacements fit into a document.
+/// Vertices, faces and features that edits list. So many displacements fit into a document.
 pub const LISTED: Limit = limit(
-    "listed vertices and faces",
+    "listed vertices, faces and features",
     750_000,
     "all edits of an order, and of the stack that it makes",
 );
@@ -115,6 +115,9 @@ pub const PROBES: Limit = limit("points", 1 << 20, "a probe");
 pub const SEEDS: Limit = limit("seeds", 1 << 16, "the places that streamlines begin at");
 /// Steps of a streamline.
 pub const STEPS: Limit = limit("steps", 1 << 17, "a streamline in one direction");
+/// Points of streamlines.
+pub const LINE_POINTS: Limit =
+    limit("points", 1 << 21, "the streamlines of a stage, in the part of the mesh that a rank has");
 /// Glyphs of a stage.
 pub const GLYPHS: Limit = limit("glyphs", 1 << 17, "a stage that draws glyphs");
 /// Pixels along one side of a picture.
@@ -144,7 +147,7 @@ pub const ERRORS: Limit =
     limit("errors", 100, "what is told of one text; of more errors only their number");
 
 /// All of them.
-pub const ALL: [Limit; 34] = [
+pub const ALL: [Limit; 35] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -174,6 +177,7 @@ pub const ALL: [Limit; 34] = [
     HISTORY_NUMBERS,
     SEEDS,
     STEPS,
+    LINE_POINTS,
     GLYPHS,
     PICTURE,
     CAMERAS,

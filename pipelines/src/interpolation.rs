@@ -187,17 +187,24 @@ pub(crate) fn solve([a, b, c]: [Vector; 3], products: Vector) -> Option<Vector> 
 }
 
 /// The parametric coordinates of a point, by Newton's method; `None` where it does not converge.
+/// A cell has at most 8 points.
 pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> Option<Vector> {
     let dimension = cell_type.dimension();
+    // Measured from the point, what is rounded is as small as the cell, however far away it lies.
+    let mut from = [[0.0; 3]; 8];
+    let from = from.get_mut(..points.len())?;
+    for (from, vertex) in from.iter_mut().zip(points) {
+        *from = subtract(*vertex, point);
+    }
     let mut at = center(cell_type);
     for _ in 0..50 {
         let shape = shape(cell_type, at)?;
-        let parts = points.iter().zip(shape.weights());
-        let here = parts.fold([0.0; 3], |sum, (point, weight)| add(sum, scale(*point, *weight)));
-        let [a, b, c] = shape.tangents(points, dimension);
+        let parts = from.iter().zip(shape.weights());
+        let beside = parts.fold([0.0; 3], |sum, (from, weight)| add(sum, scale(*from, *weight)));
+        let [a, b, c] = shape.tangents(from, dimension);
         // The rows of the matrix whose columns are the tangents.
         let rows = [0, 1, 2].map(|axis| [a[axis], b[axis], c[axis]]);
-        let step = solve(rows, subtract(point, here))?;
+        let step = scale(solve(rows, beside)?, -1.0);
         at = add(at, step);
         if at.iter().any(|x| x.abs() > 1e3) {
             return None;
@@ -212,6 +219,7 @@ pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> O
 #[cfg(test)]
 mod tests {
     use tombolo_deform::shapes::single_cell;
+    use tombolo_deform::vector::distance;
 
     use super::*;
 
@@ -272,6 +280,31 @@ mod tests {
                 "{cell_type}: {found:?}"
             );
             assert!(is_inside(cell_type, found, 0.0));
+        }
+    }
+
+    /// Geographic coordinates are in metres, millions of them from their origin.
+    #[test]
+    fn points_are_found_far_from_the_origin() {
+        for cell_type in TYPES {
+            let flat = if cell_type.dimension() == 2 { 0.0 } else { 1.0 };
+            for far in [1e4, 5e5, 5e6] {
+                let offset = [far, -0.7 * far, 0.3 * far * flat];
+                let points: Vec<Vector> =
+                    single_cell(cell_type).points().iter().map(|&it| add(it, offset)).collect();
+                for step in 1..100 {
+                    let part = f64::from(step) / 300.0;
+                    let inside = [part, 0.3 - part / 2.0, flat * (0.1 + part / 2.0)];
+                    let shape = shape(cell_type, inside).unwrap();
+                    let parts = points.iter().zip(shape.weights());
+                    let point = parts.fold([0.0; 3], |sum, (it, part)| add(sum, scale(*it, *part)));
+                    let found = locate(cell_type, &points, point)
+                        .unwrap_or_else(|| panic!("{cell_type} at {far}: {inside:?}"));
+                    // What is left is the rounding of the point itself.
+                    let allowed = 1e-15 * far + 1e-9;
+                    assert!(distance(found, inside) < 4.0 * allowed, "{cell_type}: {found:?}");
+                }
+            }
         }
     }
 }

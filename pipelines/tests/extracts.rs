@@ -8,7 +8,7 @@ use tombolo_deform::mesh::{
     ArrayView, CellType, Cells, FeatureSource, Mesh, MeshView, Values, Vector, ghosts,
 };
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets, single_cell};
-use tombolo_deform::vector::{cross, dot, length, subtract};
+use tombolo_deform::vector::{cross, dot, length, polygon_normal, subtract};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, FieldView, Snapshot};
 use tombolo_pipelines::language::parse;
 use tombolo_pipelines::run::{Output, Runner};
@@ -231,6 +231,94 @@ fn gradients_of_linear_fields_are_exact_in_every_cell_type() {
             assert!(field(&all, "divergence").values.iter().all(|x| x.abs() < 1e-12));
         }
     }
+}
+
+#[test]
+fn gradients_along_lines_have_no_part_across_them() {
+    let ends: [[Vector; 2]; 3] = [
+        [[0.956, 0.948, 0.0566], [0.0849, 0.835, 0.736]],
+        [[0.0; 3], [2.0, 0.0, 0.0]],
+        [[1e3, 2.0, 0.1], [1e3 + 0.1, 2.3, -0.4]],
+    ];
+    for [from, to] in ends {
+        let mut cells = Cells::new();
+        cells.push(CellType::Line, &[0, 1]).unwrap();
+        let mesh = Mesh::new(vec![from, to], cells, FeatureSource::SharpEdges).unwrap();
+        let x = values(&mesh, |[x, ..]| x);
+        let all = once(
+            r#"{"gradient": {"field": "x"}}, {"write": {"file": "a.vtu"}}"#,
+            &mesh,
+            &[FieldView::vertex("x", &x)],
+        );
+        let along = subtract(to, from);
+        let expected = along.map(|part| part * along[0] / dot(along, along));
+        for found in field(&all, "gradient").values.chunks(3) {
+            assert!((0..3).all(|axis| (found[axis] - expected[axis]).abs() < 1e-12), "{found:?}");
+        }
+    }
+}
+
+/// A strip and a fan of a quadrilateral, a pixel and a pentagon, all seen from above.
+fn flat_cells() -> Mesh {
+    let points = vec![
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 2.0, 0.0],
+        [1.0, 2.0, 0.0],
+        [2.0, 0.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [3.0, 0.0, 0.0],
+        [3.0, 1.0, 0.0],
+        [1.5, 2.5, 0.0],
+        [2.0, 2.0, 0.0],
+    ];
+    let mut cells = Cells::new();
+    cells.push(CellType::TriangleStrip, &[0, 1, 2, 3, 4, 5]).unwrap();
+    cells.push(CellType::Quad, &[1, 6, 7, 3]).unwrap();
+    cells.push(CellType::Pixel, &[6, 8, 7, 9]).unwrap();
+    cells.push(CellType::Polygon, &[3, 7, 11, 10, 5]).unwrap();
+    Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap()
+}
+
+#[test]
+fn faces_that_are_clipped_stay_turned_as_they_were() {
+    let mesh = flat_cells();
+    let whole: f64 = 2.0 + 1.0 + 1.0 + 1.25;
+    for (x, y) in [(0.4, 0.3), (0.37, -1.0), (-0.8, 0.55), (1.0, 1.0)] {
+        let mut areas = 0.0;
+        for sign in [1.0, -1.0] {
+            let part = once(
+                &format!(
+                    r#"{{"clip": {{"plane": {{"origin": [1.3, 0.8, 0], "normal": [{}, {}, 0]}}}}}}, {{"write": {{"file": "a.vtu"}}}}"#,
+                    sign * x,
+                    sign * y
+                ),
+                &mesh,
+                &[],
+            );
+            for cell in 0..part.cells.len() {
+                part.cells.for_each_polygon(cell, |polygon| {
+                    let up = polygon_normal(&part.points, polygon)[2];
+                    assert!(up > -1e-12, "a face is turned over: {polygon:?}");
+                    areas += up / 2.0;
+                });
+            }
+        }
+        assert!((areas - whole).abs() < 1e-12, "{areas}");
+    }
+}
+
+#[test]
+fn quality_leaves_a_field_of_the_solver_alone() {
+    let mesh = box_of_tets([2; 3], [0.0; 3], [1.0; 3]);
+    let own: Vec<f64> = (0..mesh.cells().len()).map(|cell| cell as f64).collect();
+    let stages = r#"{"clip": {"plane": {"origin": [0.0, 0, 0], "normal": [1, 0, 0]}}}, {"quality": {}}, {"write": {"file": "a.vtu"}}"#;
+    let all = once(stages, &mesh, &[FieldView::element("scaled_jacobian", &own[..])]);
+    assert_eq!(field(&all, "scaled_jacobian").values, own);
+    let measured = once(stages, &mesh, &[]);
+    assert!(field(&measured, "scaled_jacobian").values.iter().all(|&quality| quality < 1.0));
 }
 
 #[test]

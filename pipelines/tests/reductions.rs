@@ -433,6 +433,19 @@ fn a_spectrum_finds_the_frequency_of_a_flow() {
     assert!((made.monitors["shedding.frequency"] - 5.0).abs() < 0.05);
 }
 
+/// What changes its sign at each step has no partner above half the sampling rate.
+#[test]
+fn a_spectrum_knows_the_amplitude_of_what_alternates() {
+    let times: &'static [f64] = Vec::leak((0..80).map(f64::from).collect());
+    let alternating = |[x, ..]: Vector, time: f64| x * (std::f64::consts::PI * time).cos();
+    let case = Case { p: alternating, u: still, times };
+    let pipelines = r#"{"name": "a", "stages": [{"integrate": {"name": "lift", "field": "p"}},
+        {"spectrum": {"name": "odd", "monitor": "lift.mean", "samples": 64}}]}"#;
+    let made = case.everywhere(&plain(&box_of_tets([2, 1, 1], [0.0; 3], UPPER)), pipelines);
+    is_near(made.monitors["odd.frequency"], 0.5, "frequency");
+    is_near(made.monitors["odd.amplitude"], 1.0, "amplitude");
+}
+
 #[test]
 fn what_cannot_be_reduced_is_told() {
     let case = Case::steady(|[x, ..], _| x, still);

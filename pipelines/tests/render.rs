@@ -265,6 +265,19 @@ fn pixels_are_what_the_rays_of_vtk_meet() {
     }
 }
 
+/// What is selected is written; what is drawn need not be.
+#[test]
+fn a_field_that_is_not_selected_is_drawn_without_a_source() {
+    let mesh = box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
+    for source in ["", r#"{"surface": {}}, "#] {
+        let stages = format!(
+            r#"{source}{{"select": {{"fields": ["p"]}}}}, {{"render": {{"file": "a.png", "field": "x"}}}}"#
+        );
+        let picture = picture(&mesh, &stages);
+        assert!(picture.range.is_some(), "{stages}");
+    }
+}
+
 #[test]
 fn a_field_that_is_not_there_is_named_and_nothing_is_drawn() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);

@@ -172,6 +172,19 @@ fn a_trial_leaves_no_trace_and_says_what_is_wrong() {
 }
 
 #[test]
+fn a_trial_knows_the_parameters() {
+    let mut run = Run::new(&[HEALTH]);
+    run.runner.set_parameters([("inflow", 2.0)]);
+    run.step(1.0);
+    let scaled = r#"{"name": "scaled", "stages": [
+        {"expression": {"name": "twice", "formula": "speed * parameter.inflow"}},
+        {"statistics": {"field": "twice"}}]}"#;
+    assert_eq!(run.replace(&[HEALTH, scaled]).unwrap()[0], ["scaled"]);
+    let error = run.replace(&[HEALTH, &scaled.replace("inflow", "outflow")]).unwrap_err();
+    assert!(error.to_string().contains("parameter"), "{error}");
+}
+
+#[test]
 fn ranks_agree_on_what_cannot_run() {
     let mesh = box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]);
     let count = mesh.cells().len();

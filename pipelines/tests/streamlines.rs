@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::Part;
-use tombolo_deform::mesh::{Mesh, Vector};
+use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files;
@@ -208,6 +208,30 @@ fn lines_go_on_from_rank_to_rank() {
             }
         }
     }
+}
+
+/// Lines begin on a feature of a mesh of faces, and of one with cells that are hidden.
+#[test]
+fn seeds_lie_on_the_features_of_any_mesh() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let mut part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let hidden = (0..mesh.cells().len()).map(|cell| if cell == 100 { ghosts::HIDDEN } else { 0 });
+    part.ghosts = Some(hidden.collect());
+    let stage = r#"{"field": "u", "features": {"names": ["x-min"], "count": 4}}"#;
+    let (extract, errors) = lines(stage, &part, |_| [1.0, 0.0, 0.0], Arc::new(Solo));
+    assert_eq!(errors, [""; 0]);
+    let extract = extract.unwrap();
+    assert_eq!(extract.points.iter().filter(|point| point[0] < 1e-2).count(), 4);
+
+    let mut cells = Cells::new();
+    cells.push(CellType::Quad, &[0, 1, 2, 3]).unwrap();
+    let corners = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let flat = Mesh::new(corners, cells, FeatureSource::SharpEdges).unwrap();
+    let part = Part::of(&(&flat).into()).unwrap();
+    let stage = r#"{"field": "u", "features": {"names": ["feature-1"], "count": 1}}"#;
+    let (extract, errors) = lines(stage, &part, |_| [1.0, 0.0, 0.0], Arc::new(Solo));
+    assert_eq!(errors, [""; 0]);
+    assert!(extract.unwrap().points.contains(&[0.5, 0.5, 0.0]));
 }
 
 #[test]

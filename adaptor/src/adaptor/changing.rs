@@ -83,6 +83,13 @@ impl Adaptor {
         self.waiting_changes.push(WaitingChange { id, source, change, _reservation: reservation });
     }
 
+    /// Tells that the run ends before the changes that all ranks were told of are made.
+    pub(super) fn end_changes(&mut self) {
+        for WaitingChange { id, source, .. } in std::mem::take(&mut self.waiting_changes) {
+            self.end_command(&id, &source, self.saved.is_some());
+        }
+    }
+
     /// Makes the changes that all ranks were told of. All have lent the whole mesh with its fields.
     /// Collective.
     pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {
@@ -91,7 +98,10 @@ impl Adaptor {
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));
             self.describe();
-            if let (Ok(Changed { added, replaced, removed }), Some(hub)) = (made, &self.hub) {
+            if let (Ok(changed), Some(hub)) = (made, &self.hub) {
+                let Changed { added, replaced, removed, frames } = changed;
+                // Behind the `hello` that lists their views.
+                frames.into_iter().for_each(|frame| self.pipelines.send(frame, hub));
                 hub.tell(move || {
                     json!({"pipelines": {
                         "id": id, "status": "applied", "cycle": moment.cycle,

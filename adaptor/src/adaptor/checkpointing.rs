@@ -8,6 +8,7 @@ use tombolo_pipelines::language::{CheckpointNote, JournalNote, TimedCommand};
 use super::{Adaptor, SteeredMesh};
 use crate::{
     checkpoint::{Checkpoint, CheckpointError, SavedCommand, SavedMesh, SavedRun, write_of_ranks},
+    fingerprint::hash,
     step::Moment,
 };
 
@@ -35,6 +36,7 @@ impl Adaptor {
         self.log.note_and_wait(&JournalNote::Checkpoint(note));
         let changes = self.waiting_changes.iter().map(super::changing::WaitingChange::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
+        let before = waiting.len();
         self.queue.look(|received| {
             waiting.push(SavedCommand {
                 id: received.id.clone(),
@@ -42,6 +44,7 @@ impl Adaptor {
                 command: received.command.clone(),
             });
         });
+        self.saved = Some(waiting.len() - before);
         let mut pipelines = Writer::default();
         self.pipelines.save(&mut pipelines);
         let (mesh, points) = match (&self.mesh, self.lent.reference()) {
@@ -62,6 +65,7 @@ impl Adaptor {
             has_begun: self.has_begun,
             cycle,
             time,
+            met: self.meetings.last,
             parameters: parameters.collect(),
             pipelines: [self.given.pipelines.clone(), self.config.pipelines.clone()],
             timed: (self.given.orders, self.timed.left().to_vec()),
@@ -111,10 +115,7 @@ pub(super) struct Given {
     pub(super) orders: u64,
 }
 
-/// A hash by which lists of commands are told apart (FNV-1a).
+/// A hash by which lists of commands are told apart.
 pub(super) fn hash_of(commands: &[TimedCommand]) -> u64 {
-    let text = serde_json::to_vec(commands).unwrap_or_default();
-    text.iter().fold(0xcbf2_9ce4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
-    })
+    hash(serde_json::to_vec(commands).unwrap_or_default())
 }

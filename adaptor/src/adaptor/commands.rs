@@ -333,10 +333,9 @@ impl Intake {
         }
         *abandoned = None;
         drop(abandoned);
-        let (cycle, time) = self.hub.clock.get();
         let (source, command) = (Source::Program, Command::Resume {});
         // It has no name of its own that could be taken.
-        if let Ok(id) = self.log.accept(None, &source, &command, Moment { cycle, time }) {
+        if let Ok(id) = self.log.accept(None, &source, &command, self.hub.clock.get()) {
             log::warn!(
                 "the run was paused and nobody was there who could resume it for {} seconds: it goes on",
                 patience.as_secs()
@@ -413,8 +412,7 @@ impl CommandSink for Intake {
                 "{exceeded}; the turn of those before this one has not come yet, try again later"
             )
         })?;
-        let (cycle, time) = self.hub.clock.get();
-        let moment = Moment { cycle, time };
+        let moment = self.hub.clock.get();
         let received = Received {
             source: Source::Viewer(client),
             id: id.clone(),

@@ -69,13 +69,15 @@ impl Adaptor {
         check_names(channels).map_err(of_channel)?;
         channels.iter().try_for_each(Channel::check_lengths).map_err(of_channel)?;
         let steered = self.steered_among(step, channels)?;
+        // Between two meetings nothing is looked at.
+        let meets = self.meets();
         for (index, channel) in channels.iter().enumerate() {
             let is_steered = steered == Some(channel.name);
             if self.lent.is_known(channel) {
                 let is_used = is_steered && self.uses_steered(moment)
                     || self.pipelines.is_due(moment)
                         && self.pipelines.reads(moment, channel.name, index == 0);
-                if is_used {
+                if meets && is_used {
                     channel.check_points().map_err(of_channel)?;
                 }
                 continue;

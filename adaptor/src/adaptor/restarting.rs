@@ -74,8 +74,9 @@ pub(super) struct Continued {
 impl Continued {
     /// Finds out where a run goes on from. Collective.
     pub(super) fn of(settings: &mut Settings) -> Result<Option<Self>, CheckpointError> {
-        let Some(restart) = settings.restart.take() else { return Ok(None) };
         let communicator = &*settings.communicator;
+        check_given(communicator, settings.restart.as_ref())?;
+        let Some(restart) = settings.restart.take() else { return Ok(None) };
         let checkpoint = match restart {
             Restart::Checkpoint(checkpoint) => *checkpoint,
             Restart::File(file) => read_of_ranks(communicator, &file)?,
@@ -119,6 +120,29 @@ impl Continued {
         let Checkpoint { run, points, .. } = self.checkpoint;
         Resumed { mesh: run.mesh.zip(points), again: self.again }
     }
+}
+
+/// Whether all ranks were given a checkpoint to go on from, or none was. Collective.
+fn check_given(
+    communicator: &dyn Communicator,
+    restart: Option<&Restart>,
+) -> Result<(), CheckpointError> {
+    if communicator.size() == 1 {
+        return Ok(());
+    }
+    let own = match restart {
+        None => b"none".to_vec(),
+        Some(Restart::Checkpoint(_)) => b"own".to_vec(),
+        Some(Restart::File(file)) => [b"file ", file.as_os_str().as_encoded_bytes()].concat(),
+    };
+    let mut first = own.clone();
+    communicator.broadcast(0, &mut first);
+    let same = if own == first {
+        Ok(())
+    } else {
+        Err("it is to go on from another checkpoint than rank 0, or only one of the two is")
+    };
+    Ok(agree(communicator, same)?)
 }
 
 fn check_ranks(communicator: &dyn Communicator, run: &SavedRun) -> Result<(), CheckpointError> {

@@ -99,13 +99,14 @@ impl Adaptor {
         let log = Arc::new(Log::new(journal, hub.clone()));
         log.resume_notes(notes);
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
-        clock.set(moment.cycle, moment.time);
+        clock.set(moment);
         let config = Arc::new(config);
         let mut pipelines = Pipelines::new(&config, Arc::clone(&communicator), &output)?;
         if let Some(Continued { checkpoint, .. }) = &continued {
             log.resume(checkpoint.run.known.clone());
             pipelines.restore(&checkpoint.pipelines)?;
         }
+        log.expect(orders.iter().filter_map(|timed| timed.id.as_deref()));
         let changes = Arc::new(Changes::new(
             Arc::clone(&config),
             known.clone(),
@@ -142,6 +143,7 @@ impl Adaptor {
             }
             _ => None,
         };
+        let met = continued.as_ref().and_then(|continued| continued.checkpoint.run.met);
         let watch = match file {
             Some(file) if config.watch && first && !is_replay => Some(
                 Watch::start(&file, known, Arc::clone(&changes), hub.clone())
@@ -155,7 +157,7 @@ impl Adaptor {
             }
             _ => None,
         };
-        let adaptor = Self {
+        let mut adaptor = Self {
             defaults,
             pipelines,
             config,
@@ -175,6 +177,7 @@ impl Adaptor {
             changes,
             waiting_changes: Vec::new(),
             changed: 0,
+            saved: None,
             is_spared: AtomicBool::new(false),
             watch,
             forecaster,
@@ -193,6 +196,9 @@ impl Adaptor {
             meetings: Meetings::default(),
             timing: Timing::default(),
         };
+        if let Some(cycle) = met.filter(|_| adaptor.skips_meetings()) {
+            adaptor.note_meeting(cycle);
+        }
         adaptor.announce_resumed();
         adaptor.describe();
         adaptor.tell_conditions();

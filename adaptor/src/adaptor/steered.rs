@@ -119,10 +119,11 @@ impl Adaptor {
             if let Some(unknown) = unknown_conditions(surface, &self.conditions) {
                 self.complain(&unknown);
             }
+            // A stop needs it too, whether anybody watches or not.
+            if let Some(forecaster) = steerer.forecaster() {
+                let _ = self.forecaster.set(forecaster);
+            }
             if let Some(hub) = &self.hub {
-                if let Some(forecaster) = steerer.forecaster() {
-                    let _ = self.forecaster.set(forecaster);
-                }
                 let surface = ReferenceSurface::new(Arc::clone(surface));
                 described.surface = surface.described();
                 hub.offer_surface(Arc::new(surface));

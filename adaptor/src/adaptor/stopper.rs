@@ -7,7 +7,6 @@ use tombolo_pipelines::language::Command;
 use super::Adaptor;
 use crate::{
     steering::{Forecaster, Log, Queue, Received, Source},
-    step::Moment,
     stream::Clock,
 };
 
@@ -22,16 +21,17 @@ pub struct Stopper {
 
 impl Stopper {
     /// Asks the run to stop, as a viewer's `stop` does: the next call of `execute` says so to the
-    /// solver on all ranks, and one that is paused, or waits for a viewer, goes on. Shapes that are
-    /// being found are given up. Returns at once.
+    /// solver on all ranks, and one that is paused, or waits for a viewer, goes on. Returns at once.
+    ///
+    /// On one process shapes that are being found are given up. Several ranks find them together,
+    /// inside of `execute`, and give nothing up: there the stop takes effect behind them.
     ///
     /// It counts on rank 0. It takes locks, so that it must not be called inside of a signal's
     /// handler; a thread that waits for signals may call it.
     pub fn stop(&self) {
-        let (cycle, time) = self.clock.get();
         let command = Command::Stop {};
         // It has no name of its own that could be taken.
-        if let Ok(id) = self.log.accept(None, &Source::Program, &command, Moment { cycle, time }) {
+        if let Ok(id) = self.log.accept(None, &Source::Program, &command, self.clock.get()) {
             self.queue.push(Received { source: Source::Program, id, command, reservation: None });
             self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         }

@@ -1,38 +1,15 @@
 //! Files of checkpoints: those of all ranks one after the other, written whole or not at all.
 
 use std::{
-    ffi::OsString,
     fs::File,
-    io::{self, BufWriter, Read, Write},
+    io::{self, Read},
     path::Path,
 };
 
 use tombolo_deform::communicator::{Communicator, agree};
+use tombolo_pipelines::files::write_durably;
 
 use super::{Checkpoint, CheckpointError, HEAD, length_of};
-
-/// Writes a file under another name first, and gives it its own once it is on disk.
-pub(super) fn write_whole(
-    file: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<()> {
-    let mut partial = OsString::from(file);
-    partial.push(".partial");
-    let written = File::create(&partial).and_then(|out| {
-        let mut out = BufWriter::new(out);
-        write(&mut out)?;
-        out.into_inner()?.sync_all()?;
-        std::fs::rename(&partial, file)
-    });
-    if written.is_err() {
-        let _ = std::fs::remove_file(&partial);
-        return written;
-    }
-    let directory = file.parent().filter(|directory| !directory.as_os_str().is_empty());
-    // So that it is still there after a power failure, where that can be had.
-    let _ = File::open(directory.unwrap_or(Path::new("."))).and_then(|it| it.sync_all());
-    Ok(())
-}
 
 /// Writes the checkpoints of all ranks to one file, rank 0 one after the other as they come.
 /// Collective.
@@ -60,7 +37,7 @@ pub(crate) fn write_of_ranks(
             turn += 1;
             communicator.exchange_with(Vec::new(), &[turn]).pop().map(|(_, bytes)| bytes)
         };
-        written = write_whole(file, |out| {
+        written = write_durably(file, |out| {
             out.write_all(&mine.to_bytes())?;
             (1..size).try_for_each(|_| out.write_all(&next().unwrap_or_default()))
         });

@@ -10,6 +10,7 @@ use tombolo_deform::{
     communicator::{Garbled, RankError, Reader, Writer},
     shape::SavedPoints,
 };
+use tombolo_pipelines::files::write_durably;
 
 pub(crate) use file::{read_of_ranks, write_of_ranks};
 pub(crate) use saved::{SavedCommand, SavedMesh, SavedRun};
@@ -223,8 +224,7 @@ impl Checkpoint {
     /// [`CheckpointError::File`].
     pub fn write(&self, file: impl AsRef<Path>) -> Result<(), CheckpointError> {
         let file = file.as_ref();
-        let written =
-            file::write_whole(file, |out| std::io::Write::write_all(out, &self.to_bytes()));
+        let written = write_durably(file, |out| std::io::Write::write_all(out, &self.to_bytes()));
         written.map_err(|source| CheckpointError::File { file: file.into(), source })
     }
 

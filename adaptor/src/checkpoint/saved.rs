@@ -19,6 +19,9 @@ pub(crate) struct SavedRun {
     pub(crate) has_begun: bool,
     pub(crate) cycle: u64,
     pub(crate) time: f64,
+    /// The cycle at which the ranks last came together, where they do not at every call.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) met: Option<u64>,
     pub(crate) parameters: Vec<(String, f64)>,
     /// The pipelines that the run began with, and those that it has come to.
     pub(crate) pipelines: [Vec<Pipeline>; 2],

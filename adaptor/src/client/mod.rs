@@ -1,8 +1,8 @@
 //! A client of a run: it watches and steers from another program what a browser watches and steers.
 //!
 //! A [`Link`] is what a run prints. [`Client::connect`] connects to it, and keeps the connection on a
-//! thread of its own until the run ends or the [`Client`] is dropped. Every call here blocks, for as
-//! long as it is told at most.
+//! thread of its own until the run ends or the [`Client`] is closed or dropped. Every call here
+//! blocks, for as long as it is told at most.
 //!
 //! ```
 //! use std::time::Duration;
@@ -105,6 +105,8 @@ use state::{Pending, Shared};
 const SURFACE: usize = 1 << 30;
 /// How long the wheel is asked for again, while it is kept for a driver that was lost.
 const ASK_AGAIN: Duration = Duration::from_millis(300);
+/// How long closing may take: a server takes the message that is on its way, or is given up.
+const CLOSING: Duration = Duration::from_secs(12);
 
 /// How a client behaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -135,7 +137,7 @@ impl Default for Options {
     }
 }
 
-/// A client that is connected to a run. Dropping it closes the connection.
+/// A client that is connected to a run. [Closing](Self::close) or dropping it ends the connection.
 ///
 /// See the [module](self) for an example.
 pub struct Client {
@@ -441,6 +443,18 @@ impl Client {
         }
     }
 
+    /// Ends the connection as dropping the client does, for those who cannot drop it; the run goes on.
+    /// Commands, and [`next`](Self::next) behind the last event, answer [`ClientError::Closed`] then.
+    pub fn close(&self) {
+        self.let_go();
+        self.shared.wait(CLOSING, |state| state.failure.is_some().then_some(()));
+    }
+
+    fn let_go(&self) {
+        self.shared.with(|state| state.closing = true);
+        self.shared.wake.notify_one();
+    }
+
     fn id(&self) -> String {
         let count = self.count.fetch_add(1, Ordering::Relaxed) + 1;
         format!("k{:08x}-{count}", self.mark)
@@ -470,8 +484,7 @@ fn no_answer(what: &str, patience: Duration) -> ClientError {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        self.shared.with(|state| state.closing = true);
-        self.shared.wake.notify_one();
+        self.let_go();
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }

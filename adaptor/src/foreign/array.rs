@@ -77,6 +77,22 @@ impl<'call> Array<'call> {
         Self { first, count, stride, columns, number, swapped, call: PhantomData }
     }
 
+    /// The components of tuples as one list, where they lie in memory tuple after tuple without a gap:
+    /// `x0 y0 z0 x1 y1 z1 ...`.
+    pub(super) fn interleaved(components: &[Self]) -> Option<Self> {
+        let first = *components.first()?;
+        let bytes = first.number.bytes().cast_signed();
+        let tuple = bytes * components.len().cast_signed();
+        let follows = |(index, array): (usize, &Self)| {
+            array.first == first.first.wrapping_offset(index.cast_signed() * bytes)
+                && (array.count, array.stride, array.columns.0) == (first.count, tuple, 1)
+                && (array.number, array.swapped) == (first.number, first.swapped)
+        };
+        // Each of these numbers is one of a component's, for which its maker has answered (`new`).
+        let all = Self { count: first.count * components.len(), stride: bytes, ..first };
+        components.iter().enumerate().all(follows).then_some(all)
+    }
+
     /// The distance of a number from the first, in bytes.
     fn offset(&self, index: usize) -> isize {
         match self.columns {

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tombolo_deform::communicator::{Communicator, Reduction, Solo, first_failure};
 
+use crate::fingerprint::hash;
 use crate::foreign::error::RunError;
 
 /// In place of a communicator's handle: all ranks there are, with MPI or without.
@@ -69,18 +70,40 @@ pub fn agree<T>(ranks: &dyn Communicator, mine: Result<T, RunError>) -> Result<T
     agree_and_ask(ranks, mine, false, 0).map(|(mine, _)| mine)
 }
 
+/// Goes on where all ranks can and have the same text, or all have none. Collective.
+///
+/// # Errors
+/// As [`agree`]; on all ranks [`RunError::Wrong`] of this path where they have others.
+pub fn agree_on(
+    ranks: &dyn Communicator,
+    mine: Result<Option<String>, RunError>,
+    path: &str,
+) -> Result<Option<String>, RunError> {
+    let choice = mine.as_ref().ok().and_then(Option::as_deref).map_or(0, choice_of);
+    match agree_and_ask(ranks, mine, false, choice) {
+        Err(RunError::Choices) => {
+            Err(RunError::wrong(path, "another one on other ranks, or none", "the same on all"))
+        }
+        agreed => agreed.map(|(mine, _)| mine),
+    }
+}
+
+/// A number by which ranks compare what they choose: never 0, which is no choice.
+pub(super) fn choice_of(text: &str) -> u64 {
+    hash(text.bytes()).max(1)
+}
+
 /// Goes on where all ranks can; says too whether any rank says yes, and is an error where not all
-/// have the same `choice` of pipelines.
+/// have the same `choice`.
 pub(super) fn agree_and_ask<T>(
     ranks: &dyn Communicator,
     mine: Result<T, RunError>,
     yes: bool,
-    choice: u32,
+    choice: u64,
 ) -> Result<(T, bool), RunError> {
     if ranks.size() == 1 {
         return mine.map(|mine| (mine, yes));
     }
-    let choice = u64::from(choice);
     let mut said = [u64::from(mine.is_err()), u64::from(yes), choice, u64::MAX - choice];
     ranks.reduce_integers(Reduction::Maximum, &mut said);
     let [failing, any, highest, lowest] = said;
@@ -138,9 +161,7 @@ pub(super) fn gathered<O: DeserializeOwned>(
 pub fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
     let mut bytes = own.join("\n").into_bytes();
     // Most often all have the same.
-    let hash = bytes.iter().fold(bytes.len() as u64, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let hash = hash(bytes.iter().copied());
     let mut spread = [hash, u64::MAX - hash];
     ranks.reduce_integers(Reduction::Minimum, &mut spread);
     if spread[0] == u64::MAX - spread[1] {
@@ -159,4 +180,35 @@ pub fn union(ranks: &dyn Communicator, own: &[&str]) -> Vec<String> {
     }
     ranks.broadcast(0, &mut bytes);
     String::from_utf8_lossy(&bytes).lines().map(str::to_owned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::communicator::threads;
+
+    use super::*;
+
+    #[test]
+    fn what_one_rank_alone_is_given_is_an_error_on_all() {
+        let agreed = |given: [Option<&str>; 2]| {
+            threads::run(2, |ranks| {
+                let mine = given[ranks.rank()].map(str::to_owned);
+                agree_on(&ranks, Ok(mine), "a/path").map_err(|error| error.to_string())
+            })
+        };
+        assert_eq!(agreed([None, None]), [Ok(None), Ok(None)]);
+        let both = agreed([Some("file"), Some("file")]);
+        assert!(
+            both.iter().all(|mine| mine.as_ref().is_ok_and(|mine| mine.as_deref() == Some("file")))
+        );
+        for given in [[Some("file"), None], [None, Some("file")], [Some("file"), Some("other")]] {
+            let said = agreed(given);
+            let expected =
+                "'a/path': found another one on other ranks, or none; expected the same on all";
+            assert!(
+                said.iter().all(|said| said.as_ref().is_err_and(|it| it == expected)),
+                "{said:?}"
+            );
+        }
+    }
 }

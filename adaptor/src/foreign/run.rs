@@ -40,7 +40,7 @@ pub struct Run {
     time_step: f64,
     asked: Asked,
     /// The hash of the chosen pipelines' names; 0 where all run.
-    choice: u32,
+    choice: u64,
     /// The notes on what is passed over that were logged: each is logged once.
     told: HashSet<String>,
 }
@@ -77,15 +77,7 @@ impl Run {
 
     /// Lets only these of the solver's pipelines run from now on, and all others; `None`: all.
     pub fn choose(&mut self, names: Option<&[&str]>, of_solver: &dyn Fn(&str) -> bool) {
-        let choice = names.map_or(0, |names| {
-            let bytes = names.iter().flat_map(|name| name.bytes().chain([b'\n']));
-            // Not 0, which is all of them.
-            bytes
-                .fold(0x811c_9dc5, |hash: u32, byte| {
-                    (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-                })
-                .max(1)
-        });
+        let choice = names.map_or(0, |names| ranks::choice_of(&names.join("\n")));
         if choice != self.choice {
             self.choice = choice;
             self.adaptor.choose_pipelines(|name| {

@@ -22,7 +22,8 @@ use super::{
 };
 use crate::lock::lock;
 
-/// Bytes of lines that nobody waits for and that are kept while nothing can be written.
+/// Bytes of lines that nobody waits for and that are kept while nothing can be written, or while the
+/// disk takes longer than [`PATIENCE`].
 const KEPT: usize = 4 << 20;
 /// How long a disk may take before the journal counts as lost.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -71,6 +72,8 @@ struct Waiting {
     under_way: Vec<Line>,
     since: Option<Instant>,
     bytes: usize,
+    /// The bytes among these of lines that nobody has ever waited for.
+    kept: usize,
     asked: usize,
     /// Lines that could not be kept.
     lost: u64,
@@ -130,34 +133,48 @@ impl Journal {
     /// Has a line about the run written, and returns once it and all before it are on disk: after
     /// two seconds at the latest, and at once while nothing can be written.
     pub(crate) fn note_and_wait(&self, note: &JournalNote) {
-        let Some(shared) = &self.shared else { return };
+        if !self.write_and_wait(line(note)) {
+            self.note(note);
+        }
+    }
+
+    /// Returns once all lines so far are on disk and whoever waits for one of them has heard of it:
+    /// after two seconds at the latest, and at once while nothing can be written.
+    pub(crate) fn wait(&self) {
+        self.write_and_wait(Vec::new());
+    }
+
+    /// Has a text written and waits; `false` where that would be in vain.
+    fn write_and_wait(&self, text: Vec<u8>) -> bool {
+        let Some(shared) = &self.shared else { return true };
         let (done, written) = std::sync::mpsc::channel();
         let mut state = lock(&shared.state);
         if state.trouble.is_some() || state.is_closed {
-            drop(state);
-            return self.note(note);
+            return false;
         }
         let settle: Settle = Box::new(move |_| {
             let _ = done.send(());
         });
         // Should it be written after all, it needs no line that takes it back.
-        state.push(Line {
-            text: line(note),
-            asked: Some((settle, Vec::new())),
-            is_withdrawn: false,
-        });
+        state.push(Line { text, asked: Some((settle, Vec::new())), is_withdrawn: false });
         shared.changed.notify_all();
         drop(state);
         if written.recv_timeout(END).is_err() {
             log::warn!("the disk does not answer: the journal's last lines are not on it yet");
         }
+        true
+    }
+
+    /// Whether there is a journal.
+    pub(crate) fn is_kept(&self) -> bool {
+        self.shared.is_some()
     }
 
     fn push(&self, text: Vec<u8>) {
         let Some(shared) = &self.shared else { return };
         let mut state = lock(&shared.state);
-        let is_stuck = state.trouble.is_some() || state.since.is_some();
-        if is_stuck && state.bytes + text.len() > KEPT {
+        // A disk that is well takes a moment too, for a long line more than for a short one.
+        if (state.trouble.is_some() || state.is_slow()) && state.kept + text.len() > KEPT {
             state.lost += 1;
             return;
         }
@@ -200,7 +217,7 @@ impl Journal {
     pub(crate) fn look_at_time(&self) {
         let Some(shared) = &self.shared else { return };
         let mut state = lock(&shared.state);
-        if state.trouble.is_some() || state.since.is_none_or(|since| since.elapsed() < PATIENCE) {
+        if state.trouble.is_some() || !state.is_slow() {
             return;
         }
         let reason = format!("the disk has not answered for {} seconds", PATIENCE.as_secs());
@@ -255,11 +272,24 @@ impl Drop for Journal {
     }
 }
 
+impl Line {
+    /// Whether nobody has ever waited for it.
+    fn is_kept(&self) -> bool {
+        self.asked.is_none() && !self.is_withdrawn
+    }
+}
+
 impl Waiting {
     fn push(&mut self, line: Line) {
         self.bytes += line.text.len();
+        self.kept += if line.is_kept() { line.text.len() } else { 0 };
         self.asked += usize::from(line.asked.is_some());
         self.lines.push_back(line);
+    }
+
+    /// Whether the disk has not answered for too long.
+    fn is_slow(&self) -> bool {
+        self.since.is_some_and(|since| since.elapsed() >= PATIENCE)
     }
 
     /// Those who wait, who are to be told that it was in vain. What they asked for is not written
@@ -334,6 +364,8 @@ impl Shared {
                 Ok(()) => {
                     state.lost -= lost;
                     state.bytes -= lines.iter().map(|line| line.text.len()).sum::<usize>();
+                    let kept = lines.iter().filter(|line| line.is_kept());
+                    state.kept -= kept.map(|line| line.text.len()).sum::<usize>();
                     let asked = lines.into_iter().filter_map(|line| line.asked);
                     let settled: Vec<Settle> = asked.map(|(settle, _)| settle).collect();
                     state.asked -= settled.len();
@@ -448,9 +480,18 @@ mod tests {
         }
 
         fn ask(&self, id: &str) {
-            let (tell, id) = (self.answer.clone(), id.to_owned());
-            let entry = entry(&id);
-            self.journal.ask(&entry, move |outcome| tell.send((id, outcome)).unwrap());
+            self.ask_for(&entry(id));
+        }
+
+        fn ask_for(&self, entry: &JournalEntry) {
+            let (tell, id) = (self.answer.clone(), entry.id.clone());
+            self.journal.ask(entry, move |outcome| tell.send((id, outcome)).unwrap());
+        }
+
+        /// Lets the write under way have lasted for as long as a disk may take.
+        fn let_patience_end(&self) {
+            let shared = self.journal.shared.as_ref().unwrap();
+            lock(&shared.state).since = Instant::now().checked_sub(PATIENCE);
         }
 
         fn outcome(&self) -> (String, Outcome) {
@@ -484,6 +525,11 @@ mod tests {
             min_scaled_jacobian: None,
             fraction: None,
         }
+    }
+
+    /// A line of so many bytes and some more.
+    fn long(id: &str, bytes: usize) -> JournalEntry {
+        JournalEntry { reason: Some("x".repeat(bytes)), ..entry(id) }
     }
 
     fn end(cycle: u64) -> JournalNote {
@@ -544,10 +590,9 @@ mod tests {
         desk.ask("a");
         desk.wait_for_write();
         desk.ask("b");
-        let shared = desk.journal.shared.as_ref().unwrap();
         desk.journal.look_at_time();
         assert!(desk.answers.try_recv().is_err(), "it has not waited long enough");
-        lock(&shared.state).since = Instant::now().checked_sub(PATIENCE);
+        desk.let_patience_end();
         desk.journal.look_at_time();
         for id in ["a", "b"] {
             let (refused, outcome) = desk.outcome();
@@ -566,11 +611,60 @@ mod tests {
         let desk = Desk::new();
         desk.journal.note(&end(1));
         desk.wait_for_write();
-        let long = JournalEntry { reason: Some("x".repeat(1 << 20)), ..entry("a") };
+        desk.let_patience_end();
+        let long = long("a", 1 << 20);
         (0..10).for_each(|_| desk.journal.write(&long));
         let (written, _) = desk.finish();
         assert_eq!(written.lines().count(), 1 + 3 + 1);
         assert!(written.ends_with("{\"lost\":{\"lines\":7}}\n"), "{}", &written[..80]);
+    }
+
+    #[test]
+    fn while_long_lines_are_written_no_other_is_lost() {
+        let desk = Desk::new();
+        desk.ask_for(&long("asked", 2 * KEPT));
+        desk.wait_for_write();
+        desk.journal.note(&end(1));
+        // As an order of a file with the numbers of a displacement.
+        desk.journal.write(&long("of a file", 2 * KEPT));
+        desk.journal.note(&end(2));
+        let (written, _) = desk.finish();
+        assert_eq!(written.lines().count(), 4);
+        assert!(!written.contains("\"lost\""));
+    }
+
+    #[test]
+    fn on_a_slow_disk_only_lines_that_nobody_waits_for_count() {
+        let desk = Desk::new();
+        desk.ask_for(&long("under way", 2 * KEPT));
+        desk.wait_for_write();
+        desk.ask_for(&long("behind it", 2 * KEPT));
+        desk.let_patience_end();
+        desk.journal.note(&end(1));
+        desk.journal.look_at_time();
+        desk.journal.note(&end(2));
+        let (written, _) = desk.finish();
+        // The first, the line that takes it back, and the two notes.
+        assert_eq!(written.lines().count(), 4);
+        assert!(!written.contains("\"lost\""));
+    }
+
+    #[test]
+    fn what_is_kept_is_counted_to_the_byte() {
+        let desk = Desk::new();
+        desk.ask("a");
+        desk.wait_for_write();
+        desk.journal.note(&end(1));
+        desk.ask("b");
+        desk.disk.send(Err(io::Error::other("no space left"))).unwrap();
+        assert_eq!([desk.outcome().0, desk.outcome().0], ["a", "b"]);
+        desk.journal.note(&end(2));
+        let shared = Arc::clone(desk.journal.shared.as_ref().unwrap());
+        let kept = [end(1), end(2)].map(|note| line(&note).len()).iter().sum::<usize>();
+        assert_eq!(lock(&shared.state).kept, kept);
+        desk.finish();
+        let state = lock(&shared.state);
+        assert_eq!((state.kept, state.bytes), (0, 0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The commands of a run that are kept, by their names.
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{HashMap, HashSet, VecDeque},
     hash::{DefaultHasher, Hash, Hasher},
     sync::Arc,
 };
@@ -31,6 +31,9 @@ pub(crate) struct KnownCommands {
     /// The names that are taken, with what their messages say; oldest first in `named`.
     names: HashMap<String, Option<u64>>,
     named: VecDeque<String>,
+    /// The names of commands that were given beforehand and whose turn has not come.
+    #[serde(skip)]
+    expected: HashSet<String>,
     counted: u64,
 }
 
@@ -79,8 +82,8 @@ impl KnownCommands {
         let id = match wanted {
             Some(id) => match self.names.get(&id) {
                 Some(known) if known.is_some() && *known == digest => return Ok(Named::Again(id)),
-                Some(_) => return Err(format!("the id '{id}' was given to another command")),
-                None => id,
+                None if !self.expected.contains(&id) => id,
+                _ => return Err(format!("the id '{id}' was given to another command")),
             },
             None => self.next_id(),
         };
@@ -102,6 +105,18 @@ impl KnownCommands {
             self.named.push_back(id.to_owned());
         }
         self.order(id).is_some()
+    }
+
+    /// Keeps a name, unless it is taken, for a command that will come at its moment.
+    pub(super) fn expect(&mut self, id: &str) {
+        if !self.names.contains_key(id) {
+            self.expected.insert(id.to_owned());
+        }
+    }
+
+    /// Lets the command have its name for which it was kept.
+    pub(super) fn has_come(&mut self, id: &str) {
+        self.expected.remove(id);
     }
 
     /// Lets go of the name of a command that was not taken.
@@ -195,7 +210,7 @@ impl KnownCommands {
         loop {
             self.counted += 1;
             let id = format!("o{}", self.counted);
-            if !self.names.contains_key(&id) {
+            if !self.names.contains_key(&id) && !self.expected.contains(&id) {
                 return id;
             }
         }
@@ -227,6 +242,21 @@ mod tests {
         assert_eq!(named(&mut known, Some("y")), Ok(Named::New("a".into())));
         assert_eq!(known.name(None, None), Ok(Named::New("o1".into())));
         assert!(known.name(Some("o1".into()), None).is_err());
+    }
+
+    #[test]
+    fn the_name_of_a_command_that_will_come_is_kept_for_it() {
+        let mut known = KnownCommands::default();
+        ["o1", "o3"].iter().for_each(|id| known.expect(id));
+        assert_eq!(known.name(None, None), Ok(Named::New("o2".into())));
+        assert!(known.name(Some("o3".into()), Some("x")).is_err());
+        known.has_come("o3");
+        assert_eq!(known.name(Some("o3".into()), None), Ok(Named::New("o3".into())));
+        // One that was given to two commands is the first one's.
+        known.expect("o3");
+        known.has_come("o3");
+        assert!(known.name(Some("o3".into()), None).is_err());
+        assert_eq!(known.name(None, None), Ok(Named::New("o4".into())));
     }
 
     #[test]

@@ -17,6 +17,10 @@ use super::{
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
+/// What is told of a command whose turn comes in the run that goes on from the checkpoint.
+const LEFT_OPEN: &str = "the run ended before its turn came; a run that goes on from its \
+                         checkpoint carries it out";
+
 /// Who gave a command.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Source {
@@ -82,6 +86,12 @@ impl Log {
         lock(&self.state).reserve(id);
     }
 
+    /// Keeps the names of commands that were given beforehand for them.
+    pub(crate) fn expect<'a>(&self, ids: impl Iterator<Item = &'a str>) {
+        let mut state = lock(&self.state);
+        ids.for_each(|id| state.expect(id));
+    }
+
     /// Takes a command in that an earlier run has accepted, under its name.
     pub(crate) fn accept_again(
         &self,
@@ -109,7 +119,13 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) -> Result<String, String> {
-        let named = lock(&self.state).name(wanted, None)?;
+        let named = {
+            let mut state = lock(&self.state);
+            if let (Source::File, Some(id)) = (source, &wanted) {
+                state.has_come(id);
+            }
+            state.name(wanted, None)?
+        };
         let (Named::New(id) | Named::Again(id)) = named;
         self.journal.write(&accepted(&id, source, command, moment));
         self.admit(&id, command, moment);
@@ -212,8 +228,19 @@ impl Log {
         moment: Moment,
         outcome: Result<(), String>,
     ) {
+        self.answer(id, source, moment, &outcome);
+        match outcome {
+            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, [None; 2]),
+            Err(reason) => {
+                self.journal(id, JournalStatus::Rejected, moment, Some(reason), [None; 2])
+            }
+        }
+    }
+
+    /// Tells who gave a command that is no order what became of it.
+    fn answer(&self, id: &str, source: &Source, moment: Moment, outcome: &Result<(), String>) {
         let Moment { cycle, time } = moment;
-        let told = match &outcome {
+        let told = match outcome {
             Ok(()) => json!({"done": {"id": id, "cycle": cycle, "time": time}}),
             Err(reason) => json!({"error": {"message": reason, "id": id}}),
         };
@@ -222,12 +249,17 @@ impl Log {
             hub.tell_client(*client, move || told);
         }
         lock(&self.state).settle(id, told);
-        match outcome {
-            Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, [None; 2]),
-            Err(reason) => {
-                self.journal(id, JournalStatus::Rejected, moment, Some(reason), [None; 2])
-            }
-        }
+    }
+
+    /// Tells that the run ended before the turn of an order came. In the journal it stays open: a run
+    /// that goes on from the checkpoint carries it out.
+    pub(crate) fn leave_open(&self, id: &str) {
+        self.tell_rejected(id, &LEFT_OPEN.into());
+    }
+
+    /// Does what [`leave_open`](Log::leave_open) does for a command that is no order.
+    pub(crate) fn leave_command_open(&self, id: &str, source: &Source, moment: Moment) {
+        self.answer(id, source, moment, &Err(LEFT_OPEN.into()));
     }
 
     /// Changes what is known of an order and tells the viewers.
@@ -265,6 +297,17 @@ impl Log {
         self.journal.note_and_wait(note);
     }
 
+    /// Waits until the journal's lines so far are on disk and the commands in them are taken in, two
+    /// seconds at most.
+    pub(crate) fn wait(&self) {
+        self.journal.wait();
+    }
+
+    /// Whether there is a journal.
+    pub(crate) fn has_journal(&self) -> bool {
+        self.journal.is_kept()
+    }
+
     /// How many orders have come to which state.
     pub(crate) fn order_counts(&self) -> Vec<(&'static str, usize)> {
         lock(&self.state).counts()
@@ -289,9 +332,14 @@ impl Log {
 
     /// Notes that an order changes nothing, and why.
     pub(crate) fn reject(&self, id: &str, moment: Moment, rejection: &Rejection) {
-        let Rejection { reason, min_scaled_jacobian, fraction, seconds, .. } = rejection;
+        let Rejection { reason, min_scaled_jacobian, fraction, .. } = rejection;
         let numbers = [*min_scaled_jacobian, *fraction];
         self.journal(id, JournalStatus::Rejected, moment, Some(reason.clone()), numbers);
+        self.tell_rejected(id, rejection);
+    }
+
+    fn tell_rejected(&self, id: &str, rejection: &Rejection) {
+        let Rejection { reason, min_scaled_jacobian, fraction, seconds, .. } = rejection;
         self.update(id, |order| {
             order.status = OrderStatus::Rejected;
             order.reason = Some(reason.clone());

@@ -9,25 +9,34 @@ pub(super) const RATE: f64 = 20.0;
 /// Bytes of a message that count as one more.
 pub(super) const WEIGHT: usize = 1 << 20;
 
-/// A bucket that fills at [`RATE`] up to [`BURST`], and that each message takes one from, and one
-/// more for each [`WEIGHT`] of it. Whoever shows the same secret or cookie shares one, so that a new
+/// A bucket that fills at a rate up to what may be said at once, and that each message takes one
+/// from, and one more for each [`WEIGHT`] of it. The one for the messages of viewers fills at
+/// [`RATE`] up to [`BURST`]; whoever shows the same secret or cookie shares one, so that a new
 /// connection is no way around it.
 #[derive(Debug)]
 pub(super) struct Allowance {
+    burst: f64,
+    /// What comes in, in messages a second.
+    rate: f64,
     left: f64,
     since: Instant,
 }
 
 impl Default for Allowance {
     fn default() -> Self {
-        Self { left: BURST, since: Instant::now() }
+        Self::new(BURST, RATE)
     }
 }
 
 impl Allowance {
+    pub(super) fn new(burst: f64, rate: f64) -> Self {
+        Self { burst, rate, left: burst, since: Instant::now() }
+    }
+
     pub(super) fn take(&mut self, bytes: usize) -> bool {
         let now = Instant::now();
-        self.left = (self.left + RATE * now.duration_since(self.since).as_secs_f64()).min(BURST);
+        let gained = self.rate * now.duration_since(self.since).as_secs_f64();
+        self.left = (self.left + gained).min(self.burst);
         self.since = now;
         if self.left < 1.0 {
             return false;
@@ -58,8 +67,11 @@ mod tests {
 
     #[test]
     fn a_long_message_is_taken_and_paid_for() {
-        let mut allowance =
-            Allowance { left: 1.0, since: Instant::now() + Duration::from_secs(3600) };
+        let mut allowance = Allowance {
+            left: 1.0,
+            since: Instant::now() + Duration::from_secs(3600),
+            ..Allowance::default()
+        };
         assert!(allowance.take(100 * WEIGHT));
         assert!(!allowance.take(0) && allowance.left < -90.0);
     }

@@ -123,11 +123,7 @@ impl KeptSecret {
     /// The secret in a file that nobody but its owner can read; the message says why there is none.
     pub(super) fn kept(self, path: &Path) -> Result<Secret, String> {
         let failed = |error: std::io::Error| error.to_string();
-        let mut options = OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        match options.open(path) {
+        match private().create_new(true).open(path) {
             Ok(mut file) => {
                 let secret = Secret::random().map_err(|error| error.to_string())?;
                 let text = Some(secret.as_str().to_owned());
@@ -332,6 +328,15 @@ fn given<const N: usize>(
     let Some((source, text)) = found else { return Ok(None) };
     let wrong = || StreamError::Secrets(format!("{source}: {EXPECTED}"));
     Secret::given(&text).ok_or_else(wrong).map(Some)
+}
+
+/// How a file is made that nobody but its owner may read.
+pub(super) fn private() -> OpenOptions {
+    let mut options = OpenOptions::new();
+    options.write(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options
 }
 
 /// Opens a file that holds a secret, which nobody but its owner may read; the message says why not.

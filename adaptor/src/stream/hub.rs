@@ -28,7 +28,10 @@ use super::{
     together::Together,
     wheel::Wheel,
 };
-use crate::lock::{lock, wait};
+use crate::{
+    lock::{lock, wait},
+    step::Moment,
+};
 
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
@@ -71,13 +74,16 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    pub(crate) fn set(&self, cycle: u64, time: f64) {
+    pub(crate) fn set(&self, Moment { cycle, time }: Moment) {
         self.cycle.store(cycle, Ordering::Relaxed);
         self.time.store(time.to_bits(), Ordering::Relaxed);
     }
 
-    pub(crate) fn get(&self) -> (u64, f64) {
-        (self.cycle.load(Ordering::Relaxed), f64::from_bits(self.time.load(Ordering::Relaxed)))
+    pub(crate) fn get(&self) -> Moment {
+        Moment {
+            cycle: self.cycle.load(Ordering::Relaxed),
+            time: f64::from_bits(self.time.load(Ordering::Relaxed)),
+        }
     }
 }
 
@@ -401,7 +407,7 @@ impl Hub {
     /// it comes before.
     pub(super) fn tell_end(&self) {
         self.status();
-        let (cycle, time) = self.clock.get();
+        let Moment { cycle, time } = self.clock.get();
         let how = lock(&self.state).end.name();
         self.tell(move || json!({"end": {"how": how, "cycle": cycle, "time": time}}));
         for client in lock(&self.state).clients.values() {

@@ -2,7 +2,6 @@
 //! can read anywhere else.
 
 use std::{
-    fs::OpenOptions,
     io::{self, Write},
     net::SocketAddr,
     path::{Path, PathBuf},
@@ -11,7 +10,7 @@ use std::{
 
 use super::{
     connect::Connect,
-    credentials::{Access, Credentials},
+    credentials::{Access, Credentials, private},
     relay_messages::Attached,
     socket::Place,
     tls::machine,
@@ -28,11 +27,7 @@ impl LinkFile {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        let mut options = OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let mut file = options.open(&path)?;
+        let mut file = private().create_new(true).open(&path)?;
         let links = Self(path);
         file.write_all(text.as_bytes())?;
         Ok(links)

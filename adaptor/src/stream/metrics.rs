@@ -11,7 +11,7 @@ use axum::{
 use serde_json::Value;
 
 use super::{Shared, credentials::Holder, hub::Hub};
-use crate::lock::lock;
+use crate::{lock::lock, step::Moment};
 
 const TEXT: [(HeaderName, &str); 1] =
     [(header::CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8")];
@@ -58,7 +58,7 @@ impl Metrics {
 impl Hub {
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^53")]
     fn measure(&self, metrics: &mut Metrics) {
-        let (cycle, time) = self.clock.get();
+        let Moment { cycle, time } = self.clock.get();
         metrics.one("tombolo_cycle", "counter", "The step of the last call.", cycle as f64);
         metrics.one("tombolo_time", "gauge", "The simulated time then.", time);
         let counts = self.counts();
@@ -74,27 +74,28 @@ impl Hub {
         ] {
             metrics.one(name, "counter", help, value as f64);
         }
+        // The solver's thread takes this lock: what is behind it is copied, and written after it.
         let state = lock(&self.state);
         let flag = |is_so: bool| f64::from(u8::from(is_so));
-        let condition = |name: &str| state.conditions.get(name).and_then(Value::as_bool);
-        for (name, help, value) in [
+        let condition =
+            |name: &str| flag(state.conditions.get(name).and_then(Value::as_bool) == Some(true));
+        let gauges = [
             ("tombolo_viewers", "Viewers now.", state.clients.len() as f64),
             ("tombolo_driver", "1 while somebody drives.", flag(state.wheel.driver().is_some())),
-            (
-                "tombolo_paused",
-                "1 while the solver waits.",
-                flag(condition("paused") == Some(true)),
-            ),
-            ("tombolo_stopped", "1 once it is to end.", flag(condition("stopped") == Some(true))),
+            ("tombolo_paused", "1 while the solver waits.", condition("paused")),
+            ("tombolo_stopped", "1 once it is to end.", condition("stopped")),
             (
                 "tombolo_journal_lost",
                 "1 while the journal cannot be written.",
                 flag(state.journal_lost.is_some()),
             ),
-        ] {
+        ];
+        let quality = state.conditions.get("quality").and_then(|quality| quality["min"].as_f64());
+        let costs = state.costs.clone();
+        drop(state);
+        for (name, help, value) in gauges {
             metrics.one(name, "gauge", help, value);
         }
-        let quality = state.conditions.get("quality").and_then(|quality| quality["min"].as_f64());
         if let Some(least) = quality {
             let help = "The least scaled Jacobian of the mesh.";
             metrics.one("tombolo_quality_min", "gauge", help, least);
@@ -104,13 +105,12 @@ impl Hub {
             ("tombolo_pipeline_seconds_total", "Seconds inside the stages of a pipeline."),
         ] {
             metrics.describe(name, "counter", help);
-            for (pipeline, cost) in &state.costs {
+            for (pipeline, cost) in &costs {
                 let is_runs = name.contains("runs");
                 let value = if is_runs { cost.runs as f64 } else { cost.seconds };
                 metrics.sample(name, &[("pipeline", pipeline)], value);
             }
         }
-        drop(state);
         metrics.describe("tombolo_orders", "gauge", "Orders by what became of them.");
     }
 }

@@ -51,6 +51,7 @@ mod text;
 mod tls;
 mod together;
 mod viewer_files;
+mod viewer_lines;
 mod wheel;
 
 use std::{
@@ -83,6 +84,7 @@ use socket::{Listening, Place, Socket};
 use tls::Identity;
 use tokio_rustls::TlsAcceptor;
 use viewer_files::ViewerFiles;
+use viewer_lines::ViewerLines;
 
 /// How often a viewer is asked whether it is still there.
 const PING_PERIOD: Duration = Duration::from_secs(10);
@@ -173,6 +175,9 @@ pub enum StreamError {
 /// How long the end of a run waits for viewers to read that it ended.
 const END_TIME: Duration = Duration::from_secs(1);
 
+/// Threads for what would keep the others from being served.
+const BLOCKING_THREADS: usize = 2;
+
 /// A running server. Dropping it ends its threads.
 pub(crate) struct Server {
     links: Arc<Links>,
@@ -189,6 +194,7 @@ struct Shared {
     commands: Arc<dyn CommandSink>,
     files: ViewerFiles,
     limits: StreamLimits,
+    lines: Arc<ViewerLines>,
     /// The recording that is served in place of a run.
     playback: Option<Arc<playback::Shown>>,
 }
@@ -253,6 +259,7 @@ impl Server {
             commands,
             files: ViewerFiles::find(),
             limits: settings.limits,
+            lines: Arc::default(),
             playback,
         };
         let (acceptor, fingerprint) =
@@ -268,6 +275,9 @@ impl Server {
         let (stop, stopped) = oneshot::channel();
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
+            // Answers that take long, of which there may be many asked for at once, and names that
+            // are looked up: none of them waits for another.
+            .max_blocking_threads(BLOCKING_THREADS)
             .build()
             .map_err(StreamError::Thread)?;
         let mut server =

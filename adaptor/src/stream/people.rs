@@ -71,7 +71,7 @@ impl Hub {
 
     /// Pins a note of a viewer, and has it told; the error says why not.
     pub(super) fn pin(&self, client: u64, note: NewNote) -> Result<PinnedNote, String> {
-        let now = self.clock.get().0;
+        let now = self.clock.get().cycle;
         let mut state = lock(&self.state);
         state.check_journal()?;
         let together = &mut state.together;

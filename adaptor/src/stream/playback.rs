@@ -5,7 +5,7 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicU64, AtomicUsize, Ordering},
-        mpsc::{Receiver, RecvTimeoutError, channel},
+        mpsc::{Receiver, RecvTimeoutError, sync_channel},
     },
     time::{Duration, Instant},
 };
@@ -32,6 +32,9 @@ const UNDECODED: u64 = 8;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How fast a recording may be gone through.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
+/// What a viewer has asked for that waits for its turn, and the errors that it has yet to be told.
+const SAID: usize = 64;
+const ERRORS: usize = 16;
 /// Orders that a viewer is told of at once, the newest.
 const ORDERS: usize = 100;
 
@@ -58,13 +61,6 @@ enum Seek {
     Seconds(f64),
     Cycle(u64),
     Time(f64),
-}
-
-/// What a viewer says.
-enum Said {
-    Play(Play),
-    /// It has decoded so many frames.
-    Decoded,
 }
 
 /// Where a viewer is in a recording.
@@ -109,7 +105,7 @@ impl Shown {
             return;
         }
         let (messages, mut waiting) = mpsc::channel(WAITING);
-        let (says, said) = channel();
+        let (says, said) = sync_channel(SAID);
         let decoded = Arc::new(AtomicU64::new(0));
         let player = {
             let (file, decoded) = (self.file.clone(), Arc::clone(&decoded));
@@ -126,6 +122,13 @@ impl Shown {
         }
         let (mut sink, mut stream) = socket.split();
         let errors = tokio::sync::Mutex::new(Vec::<String>::new());
+        // One that says much and reads nothing is told no more than it can read.
+        let complain = async |error: String| {
+            let mut errors = errors.lock().await;
+            if errors.len() < ERRORS {
+                errors.push(error);
+            }
+        };
         let write = async {
             while let Some(message) = waiting.recv().await {
                 for error in errors.lock().await.drain(..) {
@@ -145,13 +148,16 @@ impl Shown {
                     Wire::Binary(bytes) => {
                         if let Ok(count) = <[u8; 8]>::try_from(&bytes[..]) {
                             decoded.fetch_max(u64::from_le_bytes(count), Ordering::Relaxed);
-                            let _ = says.send(Said::Decoded);
                         }
                     }
                     Wire::Text(text) => match understood(&text) {
-                        Ok(Some(play)) => _ = says.send(Said::Play(play)),
+                        Ok(Some(play)) => {
+                            if says.try_send(play).is_err() {
+                                complain(too_many()).await;
+                            }
+                        }
                         Ok(None) => {}
-                        Err(error) => errors.lock().await.push(error),
+                        Err(error) => complain(error).await,
                     },
                     Wire::Ping(_) | Wire::Pong(_) => {}
                 }
@@ -171,6 +177,14 @@ impl Drop for Seat<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
+}
+
+/// The answer to one that says more than is listened to.
+fn too_many() -> String {
+    let message = format!(
+        "found more than {SAID} messages that wait, expected fewer; try again once the recording has followed"
+    );
+    json!({"error": {"message": message}}).to_string()
 }
 
 /// What a message asks for; the error is the answer.
@@ -206,7 +220,7 @@ fn understood(text: &str) -> Result<Option<Play>, String> {
 struct Player {
     recording: Recording,
     messages: mpsc::Sender<Wire>,
-    said: Receiver<Said>,
+    said: Receiver<Play>,
     decoded: Arc<AtomicU64>,
     sent: u64,
     speed: f64,
@@ -224,7 +238,7 @@ impl Player {
     fn new(
         recording: Recording,
         messages: mpsc::Sender<Wire>,
-        said: Receiver<Said>,
+        said: Receiver<Play>,
         decoded: Arc<AtomicU64>,
     ) -> Self {
         let now = Instant::now();
@@ -272,7 +286,7 @@ impl Player {
             }
             let wait = Duration::try_from_secs_f64(wait.max(0.0)).unwrap_or(PERIOD).min(PERIOD);
             match self.said.recv_timeout(wait) {
-                Ok(said) => self.hear(said)?,
+                Ok(asked) => self.hear(asked)?,
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Err(Gone),
             }
@@ -290,8 +304,8 @@ impl Player {
         self.messages.blocking_send(message).map_err(|_| Gone)
     }
 
-    fn hear(&mut self, said: Said) -> Result<(), Gone> {
-        let Said::Play(Play { seek, speed, paused }) = said else { return Ok(()) };
+    fn hear(&mut self, asked: Play) -> Result<(), Gone> {
+        let Play { seek, speed, paused } = asked;
         self.at = (self.seconds(), Instant::now());
         if let Some(paused) = paused {
             self.is_paused = paused;

@@ -31,6 +31,8 @@ use super::{
 /// The largest message that is read at all, in bytes: so much more than a document may have that
 /// one too long is answered with an error.
 const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
+/// The same for a client that can never command: nothing that it may say is near as long.
+const WATCHED_SIZE: usize = 1 << 16;
 
 /// All routes, behind the gate.
 pub(super) fn router(shared: Shared) -> Router {
@@ -59,8 +61,13 @@ async fn upgrade(
         Ok(upgrade) => upgrade,
         Err(rejection) => return rejection.into_response(),
     };
-    let upgrade = upgrade.max_message_size(MESSAGE_SIZE).max_frame_size(MESSAGE_SIZE);
-    upgrade.on_upgrade(move |mut socket| async move {
+    let only_watches = parameter(&uri, "role") == Some("watch");
+    let access = if only_watches { Access::Watch } else { holder.access };
+    let most = match access {
+        Access::Drive if shared.playback.is_none() => MESSAGE_SIZE,
+        _ => WATCHED_SIZE,
+    };
+    upgrade.max_message_size(most).max_frame_size(most).on_upgrade(move |mut socket| async move {
         connection.upgraded();
         if let Some(shown) = &shared.playback {
             let shown = Arc::clone(shown);
@@ -68,8 +75,6 @@ async fn upgrade(
         }
         let returning = parameter(&uri, "client").zip(parameter(&uri, "back"));
         let limit = shared.limits.viewers.get() as usize;
-        let only_watches = parameter(&uri, "role") == Some("watch");
-        let access = if only_watches { Access::Watch } else { holder.access };
         let refusal = match shared.hub.join(limit, access, returning) {
             Ok(Arrival::Client(client)) => {
                 let address = connection.address();

@@ -22,6 +22,7 @@ use super::{
     hub::Hub,
     outbox::{Client, Message},
     text::Text,
+    viewer_lines::ViewerLines,
 };
 use crate::lock::lock;
 
@@ -37,8 +38,8 @@ pub(super) async fn serve(
     address: IpAddr,
     shared: Shared,
 ) {
-    let Shared { hub, commands, gate, .. } = shared;
-    let seat = Seat { client: &client, hub: &hub, commands: &*commands, address };
+    let Shared { hub, commands, gate, lines, .. } = shared;
+    let seat = Seat { client: &client, hub: &hub, commands: &*commands, lines: &lines, address };
     seat.note(ViewerMove::Came);
     if hub.is_driver(client.id) {
         commands.driven();
@@ -56,18 +57,22 @@ struct Seat<'a> {
     client: &'a Arc<Client>,
     hub: &'a Hub,
     commands: &'a dyn CommandSink,
+    lines: &'a ViewerLines,
     address: IpAddr,
 }
 
 impl Seat<'_> {
-    /// Notes in the journal who came and went, and who was given a link for others.
+    /// Notes in the journal who came and went, and who was given a link for others, unless there has
+    /// been too much of it of late.
     fn note(&self, did: ViewerMove) {
+        let Ok(left_out) = self.lines.take(self.client.access) else { return };
         self.commands.note(JournalNote::Viewer(ViewerNote {
             name: Hub::name(self.client.id),
             address: self.address.to_string(),
             called: self.hub.called(self.client.id),
             may_drive: self.client.access == Access::Drive,
             did,
+            left_out,
         }));
     }
 }

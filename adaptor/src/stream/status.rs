@@ -9,7 +9,7 @@ use super::{
     hub::{Hub, name},
     text::Text,
 };
-use crate::lock::lock;
+use crate::{lock::lock, step::Moment};
 
 /// A status is told again after this long though nothing in it has changed: a page, which cannot see
 /// a server's pings, knows by it that it is still connected.
@@ -30,7 +30,7 @@ impl Hub {
 
     /// The status, where it is to be told, and whether anything in it has changed.
     fn new_status(&self) -> Option<(bool, impl FnOnce() -> Map<String, Value> + Send + use<>)> {
-        let (cycle, time) = self.clock.get();
+        let Moment { cycle, time } = self.clock.get();
         let mut state = lock(&self.state);
         if !state.has_audience() {
             state.last_status = None;
@@ -95,7 +95,7 @@ mod tests {
         };
         assert!(told(&hub).is_some_and(|(is_news, _)| is_news));
         std::thread::sleep(Duration::from_millis(1));
-        hub.clock.set(1, 0.1);
+        hub.clock.set(Moment { cycle: 1, time: 0.1 });
         let (is_news, first) = told(&hub).expect("a step is news");
         assert!(is_news && first["step_seconds"].as_f64() > Some(0.0), "{first}");
         assert!(told(&hub).is_none());

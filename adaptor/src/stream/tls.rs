@@ -2,7 +2,6 @@
 //! that is made for the run.
 
 use std::{
-    fs::OpenOptions,
     io::{Read, Write},
     net::SocketAddr,
     path::Path,
@@ -21,7 +20,11 @@ use rustls::{
 use tokio_rustls::TlsAcceptor;
 use tombolo_pipelines::language::{StreamServer, Tls};
 
-use super::{StreamError, credentials::open_private, socket::Place};
+use super::{
+    StreamError,
+    credentials::{open_private, private},
+    socket::Place,
+};
 use crate::fingerprint::fingerprint;
 
 /// The certificate of a server, with its key.
@@ -66,11 +69,8 @@ impl Identity {
             let made = rcgen::generate_simple_self_signed(names)
                 .map_err(|error| StreamError::Tls(error.to_string()))?;
             let write = |path: &Path, bytes: &[u8]| {
-                let mut options = OpenOptions::new();
-                options.write(true).create(true).truncate(true);
-                #[cfg(unix)]
-                std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-                let written = options.open(path).and_then(|mut file| file.write_all(bytes));
+                let file = private().create(true).truncate(true).open(path);
+                let written = file.and_then(|mut file| file.write_all(bytes));
                 written.map_err(|error| wrong(path, &error.to_string()))
             };
             // The key last: where it is there, the certificate is.

@@ -164,6 +164,10 @@ pub struct Viewer {
     /// Texts that nobody has looked for yet.
     pub seen: Vec<Value>,
     pub frames: Vec<Vec<u8>>,
+    /// The views that a `hello` has listed, the first one first.
+    listed: Vec<String>,
+    /// How many of them were listed before each frame.
+    listed_before: Vec<usize>,
     decoder: Decoder,
 }
 
@@ -183,7 +187,9 @@ impl Viewer {
         let (socket, _) =
             runtime.block_on(tokio_tungstenite::connect_async(url)).map_err(Box::new)?;
         let decoder = Decoder::new();
-        Ok(Self { runtime, socket, seen: Vec::new(), frames: Vec::new(), decoder })
+        let (seen, frames) = (Vec::new(), Vec::new());
+        let (listed, listed_before) = (Vec::new(), Vec::new());
+        Ok(Self { runtime, socket, seen, frames, listed, listed_before, decoder })
     }
 
     pub fn send(&mut self, message: &Value) {
@@ -212,10 +218,24 @@ impl Viewer {
         }
     }
 
-    /// Decodes the frames that came since the last call, and takes them away.
+    /// Decodes the frames that came since the last call, and takes them away. Each is of a view that
+    /// was listed before.
     pub fn decoded(&mut self) -> Vec<DecodedFrame> {
-        let decoder = &mut self.decoder;
-        self.frames.drain(..).map(|frame| decoder.decode(&frame).expect("a frame")).collect()
+        let (decoder, listed) = (&mut self.decoder, &self.listed);
+        let frames = self.frames.drain(..).zip(self.listed_before.drain(..));
+        let decode = |(frame, before): (Vec<u8>, usize)| {
+            let frame = decoder.decode(&frame).expect("a frame");
+            assert!(listed[..before].contains(&frame.view), "{} is not listed yet", frame.view);
+            frame
+        };
+        frames.map(decode).collect()
+    }
+
+    fn keep_text(&mut self, text: &str) {
+        let message: Value = serde_json::from_str(text).expect("JSON");
+        let views = message["hello"]["views"].as_array().into_iter().flatten();
+        self.listed.extend(views.filter_map(|view| view["name"].as_str().map(str::to_owned)));
+        self.seen.push(message);
     }
 
     /// A text message under `key` that fits, from those seen or the next ones.
@@ -233,8 +253,11 @@ impl Viewer {
             }
             let left = until.saturating_duration_since(Instant::now());
             match self.read(left)? {
-                Message::Text(text) => self.seen.push(serde_json::from_str(&text).expect("JSON")),
-                Message::Binary(bytes) => self.frames.push(bytes.to_vec()),
+                Message::Text(text) => self.keep_text(&text),
+                Message::Binary(bytes) => {
+                    self.frames.push(bytes.to_vec());
+                    self.listed_before.push(self.listed.len());
+                }
                 _ => {}
             }
         }
@@ -254,7 +277,7 @@ impl Viewer {
         loop {
             match self.read(PATIENCE)? {
                 Message::Close(frame) => return frame.map(|frame| frame.code.into()),
-                Message::Text(text) => self.seen.push(serde_json::from_str(&text).expect("JSON")),
+                Message::Text(text) => self.keep_text(&text),
                 _ => {}
             }
         }

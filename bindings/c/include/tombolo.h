@@ -20,8 +20,8 @@
  *
  * Texts that are answered belong to the run and are never cut; each function says how long they are valid.
  *
- * Ranks. On several ranks of MPI all call tombolo_open, tombolo_start, tombolo_execute, tombolo_finalize and tombolo_close, for the
- * same cycle; an error of one rank is that of all.
+ * Ranks. On several ranks of MPI all call tombolo_open, tombolo_restart, tombolo_start, tombolo_execute, tombolo_checkpoint,
+ * tombolo_finalize and tombolo_close, for the same cycle and with the same files; an error of one rank is that of all.
  *
  * Threads. One thread at a time uses a run; another is answered with TOMBOLO_WRONG_CALL, and so is whoever uses a run that was closed. */
 #ifndef TOMBOLO_H
@@ -140,7 +140,7 @@ int tombolo_parameter(tombolo* run, const char* name, double value, double minim
  * somebody wants otherwise. */
 int tombolo_condition(tombolo* run, const char* feature, int condition);
 /* Goes on from the state that tombolo_checkpoint has saved, with the same mesh on as many ranks: the next tombolo_execute is the one
- * that would have come next. Before the run begins. */
+ * that would have come next. Before the run begins, on all ranks. */
 int tombolo_restart(tombolo* run, const char* file);
 /* Begins; the first tombolo_execute does so where this was not called. */
 int tombolo_start(tombolo* run);

@@ -170,6 +170,18 @@ impl Client {
         Ok(Some((name, told.text.into_pyobject(py)?.into_any())))
     }
 
+    /// Ends the connection, whatever still holds this client.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        // A fork has not the thread that it would wait for.
+        if std::process::id() != self.process {
+            return Ok(());
+        }
+        guarded(|| {
+            py.detach(|| self.client.close());
+            Ok(())
+        })
+    }
+
     /// Whether this client steers.
     #[getter]
     fn drives(&self) -> bool {

@@ -38,6 +38,22 @@ def test_why_there_is_no_run_is_told_and_it_is_tried_again(solver, tmp_path, mon
     assert known.failure is None
 
 
+def test_another_run_behind_the_same_file_is_found_once_the_first_has_ended(begin, tmp_path, monkeypatch):
+    first, file = begin(), tmp_path / "run.link"
+    file.write_text(first.link)
+    known = connection(str(file))
+    ended = wait(lambda: known.surface and known.run)
+    first.close()
+    wait(lambda: not ended.connected)
+    assert connection(str(file)).run is ended and known.surface is not None
+    second = begin()
+    file.write_text(second.link)
+    monkeypatch.setattr(background.clock, "monotonic", lambda now=time.monotonic: now() + 10)
+    assert connection(str(file)) is known
+    assert wait(lambda: known.run is not ended and known.run).link == second.link
+    assert wait(lambda: known.surface) is not None and known.failure is None
+
+
 def test_orders_are_forecast_given_and_taken_back(solver):
     known, requests = connection(solver.link), Requests()
     run = wait(lambda: known.run)

@@ -213,9 +213,11 @@ def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
     # As how far points lie from the reference: none of them has moved.
     order.SetArray(None)
     order.SetInputConnection(surface.GetOutputPort())
-    assert order.edits(SimpleNamespace(surface=tombolo.background.connection(solver.link).surface)) == [
-        {"displacement": {"vertices": [], "values": []}}
-    ]
+    reference = tombolo.background.connection(solver.link).surface
+    assert order.edits(SimpleNamespace(surface=reference)) == [{"displacement": {"vertices": [], "values": []}}]
+    other = reference._replace(vertices=reference.vertices + 1)
+    with pytest.raises(tombolo.MeshError, match="found other vertices"):
+        order.edits(SimpleNamespace(surface=other))
 
 
 def test_why_there_is_no_run_is_told_once_in_plain_vtk(plugin, tmp_path):

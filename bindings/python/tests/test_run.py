@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import tombolo
 from conftest import SQUEEZE, wait
+from tombolo.state import State
 
 
 def test_what_a_feature_is_to_the_flow(begin):
@@ -261,6 +262,37 @@ def test_a_closed_run_gives_up_the_wheel_though_it_is_still_held(solver):
         assert second.drives and not first.drives
 
 
+def drives(run):
+    try:
+        run.drive()
+    except tombolo.NotDriverError:
+        return False
+    return run.drives
+
+
+def test_a_closed_run_gives_up_the_wheel_though_an_error_holds_its_client():
+    with tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}}) as adaptor:
+        first = tombolo.connect(adaptor.link)
+        first.drive()
+        with pytest.raises(tombolo.LinkError, match="404") as kept:
+            _ = first.surface
+        first.close()
+        with tombolo.connect(adaptor.link) as second:
+            assert wait(lambda: drives(second), 10)
+        assert kept.value.__traceback__ is not None
+
+
+def test_nothing_is_sent_by_a_client_that_was_closed(solver):
+    run = tombolo.connect(solver.link)
+    client = run._reader.client
+    run.close()
+    run.close()
+    with pytest.raises(tombolo.EndedError):
+        client.pause()
+    with pytest.raises(tombolo.CallError, match="closed"):
+        run.pause()
+
+
 def closes_at_once(server):
     server.accept()[0].close()
 
@@ -294,6 +326,25 @@ def test_a_link_is_found_in_the_file_that_the_run_writes(solver, tmp_path):
     file.write_text("nothing")
     with pytest.raises(tombolo.LinkError, match="without a link"):
         tombolo.connect(file)
+    file.write_text("drive: https://127.0.0.1:1/?token=abc\ndrive: http://127.0.0.1:2/?token=abc\n")
+    with pytest.raises(tombolo.LinkError, match=r"127\.0\.0\.1:1: the connection was refused"):
+        tombolo.connect(file)
+    file.write_text(f"drive: unix:{tmp_path}/run.sock?token=abc\n")
+    with pytest.raises(tombolo.LinkError, match=r"unix:/.*run\.sock"):
+        tombolo.connect(file)
+
+
+def test_a_message_of_another_form_is_an_event_and_no_end():
+    state = State()
+    assert state.take("unknown", {"status": {"cycle": -1}}) == ("status", {"cycle": -1})
+    assert state.status is None
+
+
+def test_nobody_waits_for_a_reader_that_has_failed(solver, monkeypatch):
+    with tombolo.connect(solver.link) as run:
+        monkeypatch.setattr(run._state, "take", lambda kind, data: 1 / 0)
+        with pytest.raises(tombolo.FailedError, match="ZeroDivisionError"):
+            run.wait_for(lambda: False, 30)
 
 
 class Relay:
@@ -367,7 +418,18 @@ def test_a_run_in_async(solver, run):
         async for event in aio.events("monitor"):
             assert event.data["pipeline"] == "health"
             break
+        assert await aio.stack() == run.stack and await aio.pipelines() == run.pipelines
+        cut = {"name": "cut", "stages": [{"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}
+        await aio.change_pipelines({"set": [cut]}, timeout=30)
+        assert (await aio.wait_for_view("cut", timeout=30)).name == "cut"
+        with pytest.raises(KeyError, match="cut"):
+            await aio.wait_for_view("cub", timeout=1)
+        # What is told from this call on comes, whenever it is first asked for.
+        events = aio.events("order")
         await (await aio.undo()).wait(60)
+        assert (await events.__anext__()).data["status"] == "accepted"
+        await aio.close()
+        assert [event async for event in events] == []
 
     asyncio.run(work())
 

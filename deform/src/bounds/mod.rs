@@ -4,6 +4,7 @@ mod tree;
 
 pub use tree::{BoxTree, Boxed};
 
+use crate::communicator::Communicator;
 use crate::vector::{Vector, subtract};
 
 /// The least box along the axes around some points.
@@ -42,6 +43,15 @@ impl Bounds {
             lower: std::array::from_fn(|axis| self.lower[axis].min(other.lower[axis])),
             upper: std::array::from_fn(|axis| self.upper[axis].max(other.upper[axis])),
         }
+    }
+
+    /// The least box around the boxes of all ranks. Collective.
+    #[must_use]
+    pub fn of_ranks(&self, communicator: &dyn Communicator) -> Self {
+        let mut ranges: [[f64; 2]; 3] =
+            std::array::from_fn(|axis| [self.lower[axis], self.upper[axis]]);
+        communicator.join_ranges(&mut ranges);
+        Self { lower: ranges.map(|[lower, _]| lower), upper: ranges.map(|[_, upper]| upper) }
     }
 
     /// The two corners: the lowest coordinates, then the highest.

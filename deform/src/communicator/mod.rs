@@ -133,6 +133,18 @@ pub trait Communicator: std::fmt::Debug + Send + Sync {
             .for_each(|(value, bytes)| *value = u64::from_le_bytes(*bytes));
     }
 
+    /// Widens ranges, each its least and its largest number, to those of all ranks. One from infinity
+    /// to minus infinity holds nothing, and widens none.
+    fn join_ranges(&self, ranges: &mut [[f64; 2]]) {
+        // The least of some numbers is the largest of those below 0, in one message with the others.
+        let mut ends: Vec<f64> =
+            ranges.iter().flat_map(|[least, largest]| [-least, *largest]).collect();
+        self.reduce(Reduction::Maximum, &mut ends);
+        for (range, [least, largest]) in ranges.iter_mut().zip(ends.as_chunks().0) {
+            *range = [-least, *largest];
+        }
+    }
+
     /// Whether something holds on all ranks.
     fn all(&self, mine: bool) -> bool {
         self.least(usize::from(mine)) > 0

@@ -232,6 +232,12 @@ mod tests {
         let mut values = [f64::NAN, if rank == 0 { 2.0 } else { f64::NAN }];
         ranks.reduce(Reduction::Maximum, &mut values);
         assert!(values[0].is_nan() && values[1] == 2.0, "NaN is passed over");
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let mut ranges =
+            [if rank == 0 { [1.0, 2.0] } else { none }, [-(rank as f64), rank as f64], none];
+        ranks.join_ranges(&mut ranges);
+        let last = size as f64 - 1.0;
+        assert_eq!(ranges, [[1.0, 2.0], [-last, last], none]);
         let sums = [1.0 / (rank as f64 + 3.0), 1e16 * (-1f64).powi(rank as i32)];
         let mut values = sums;
         ranks.reduce(Reduction::Sum, &mut values);

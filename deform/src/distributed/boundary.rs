@@ -137,7 +137,7 @@ impl PartBoundary {
         settings: &FeatureSettings,
     ) -> Result<(SharedVertices, Self), DistributedError> {
         let outer = drawn_faces(&**communicator, part)?;
-        handedness::check(&**communicator, part)?;
+        handedness::check(&**communicator, &part.cells, &part.points)?;
         let shared = SharedVertices::beside(communicator, part, &outer, TOLERANCE, Doubt::Refused)?;
         let boundary = Self::of(communicator, part, settings, outer, &shared)?;
         Ok((shared, boundary))

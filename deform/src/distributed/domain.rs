@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{DistributedError, Part, PartBoundary};
+use super::{DistributedError, Part, PartBoundary, handedness};
 use crate::communicator::{Communicator, agree};
 use crate::features::FeatureSettings;
 use crate::mesh::{Domain, FeatureSource, Mesh, MeshError};
 
 /// The domain of which each rank has a part, and its boundary. The mesh of the domain has the
-/// part's own cells of volume, and all of its vertices. Collective.
+/// part's own cells of the whole mesh's dimension, volumes or faces, and all of its vertices.
+/// Collective.
 ///
 /// # Errors
 /// [`DistributedError`], the same on all ranks.
@@ -18,15 +19,19 @@ pub fn domain(
     settings: &FeatureSettings,
 ) -> Result<(Domain, PartBoundary), DistributedError> {
     let (shared, boundary) = PartBoundary::find(communicator, part, settings)?;
-    let (mesh, own) = agree(communicator, own_mesh(part))?;
+    let dimension = communicator.most(part.cells.dimension()).max(2);
+    let (mesh, own) = agree(communicator, own_mesh(part, dimension))?;
+    // Its own cells alone may seem to be of the other hand than those beside them.
+    handedness::check(&**communicator, mesh.cells(), mesh.points())?;
     let numbers = cell_numbers(&**communicator, part, &own);
     Ok((Domain::of_rank(mesh, &shared, numbers, boundary.faces().clone()), boundary))
 }
 
-/// The cells of a part that are its own and of volume, with all its vertices, and where they stand
-/// among the part's cells.
-fn own_mesh(part: &Part) -> Result<(Mesh, Vec<usize>), MeshError> {
-    let is_own = |cell: &usize| part.is_own(*cell) && part.cells.cell_type(*cell).dimension() == 3;
+/// The cells of a part that are its own and of this dimension, with all its vertices, and where they
+/// stand among the part's cells.
+fn own_mesh(part: &Part, dimension: usize) -> Result<(Mesh, Vec<usize>), MeshError> {
+    let is_own =
+        |cell: &usize| part.is_own(*cell) && part.cells.cell_type(*cell).dimension() == dimension;
     let own: Vec<usize> = (0..part.cells.len()).filter(is_own).collect();
     let cells = part.cells.subset(own.iter().copied());
     Ok((Mesh::new(part.points.clone(), cells, FeatureSource::SharpEdges)?, own))

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::positions::{self, Candidate, Doubt, Twins};
+use super::positions::{self, Candidate, Doubt, Held, Twins};
 use super::{DistributedError, Part, TOLERANCE};
 use crate::communicator::{Communicator, Garbled, Halo, Reader, Writer, agree};
 use crate::mesh::SharedVertices;
@@ -58,7 +58,7 @@ impl SharedVertices {
         if ranks.size() == 1 {
             return Self::alone(communicator, part);
         }
-        let held = held(part);
+        let held = held(part, ranks.most(part.cells.dimension()));
         // Which ranks number their vertices; whether any has ghosts.
         let numbers = part.global_vertices.as_deref().filter(|_| count > 0);
         let numbering = ranks.least(if numbers.is_some() { rank } else { usize::MAX });
@@ -66,9 +66,15 @@ impl SharedVertices {
         let fault = (by_number && numbers.is_none() && count > 0)
             .then_some(DistributedError::Numbers { other: numbering });
         agree(ranks, fault.map_or(Ok(()), Err))?;
-        let ghosts = ranks.any((0..part.cells.len()).any(|cell| !part.is_own(cell)));
+        let ghosts = (0..part.cells.len()).any(|cell| !part.is_own(cell));
+        let lower = (0..count).any(|vertex| held[vertex] == Held::Lower);
+        let may_lie_inside = ranks.any(ghosts || lower);
 
-        let mut candidates = candidates(part, outer, &held, ghosts);
+        let mut candidates = candidates(part, outer, &held, may_lie_inside);
+        if !by_number && doubt == Doubt::Refused {
+            let spare = spare(part);
+            candidates.retain(|&(vertex, _)| !spare[vertex as usize]);
+        }
         if doubt == Doubt::Apart {
             // A vertex of no cell, as those that finer grids cover, is not shown: it casts no doubt
             // on others. Points alone, such as particles, are each their own, wherever they are.
@@ -85,9 +91,9 @@ impl SharedVertices {
         let twins = agree(ranks, twins)?;
         let mut owners = vec![index(rank); count];
         for (vertex, twins) in &twins {
-            let own = (!held[*vertex as usize], owners[*vertex as usize]);
+            let own = (held[*vertex as usize], owners[*vertex as usize]);
             let best =
-                twins.iter().map(|twin| (!twin.held, twin.rank)).fold(own, std::cmp::Ord::min);
+                twins.iter().map(|twin| (twin.held, twin.rank)).fold(own, std::cmp::Ord::min);
             owners[*vertex as usize] = best.1;
         }
         let owned = owners.iter().filter(|&&owner| owner as usize == rank).count();
@@ -123,18 +129,51 @@ impl SharedVertices {
     }
 }
 
-/// For each vertex whether it belongs to a cell of the rank's own.
-fn held(part: &Part) -> Vec<bool> {
-    let own = part.cells.iter().enumerate().filter(|(cell, _)| part.is_own(*cell));
-    marks(part.points.len(), own.flat_map(|(_, (_, vertices))| vertices))
+/// What the rank has of its own around each vertex of a mesh of this dimension.
+fn held(part: &Part, dimension: usize) -> Vec<Held> {
+    let mut held = vec![Held::Nothing; part.points.len()];
+    for (cell, (cell_type, vertices)) in part.cells.iter().enumerate() {
+        if part.is_own(cell) {
+            let is_whole = cell_type.dimension() == dimension;
+            let of_cell = if is_whole { Held::Whole } else { Held::Lower };
+            for &vertex in vertices {
+                let known = &mut held[vertex as usize];
+                *known = of_cell.min(*known);
+            }
+        }
+    }
+    held
 }
 
-/// The vertices that other ranks may have. Without ghosts those are not inside the part: around a
-/// vertex of which another rank has cells there is a face that has a cell here on one side only.
-fn candidates(part: &Part, outer: &BoundaryFaces, held: &[bool], ghosts: bool) -> Vec<Candidate> {
+/// For each vertex whether no cell has it and others without a cell lie where it does: the end of
+/// an array that is longer than what is used of it. Nobody can tell which of them is meant, and
+/// nobody asks.
+fn spare(part: &Part) -> Vec<bool> {
+    let used = marks(part.points.len(), part.cells.connectivity());
+    let mut unused: Vec<([u64; 3], usize)> = (0..part.points.len())
+        .filter(|&vertex| !used[vertex])
+        .map(|vertex| (part.points[vertex].map(f64::to_bits), vertex))
+        .collect();
+    unused.sort_unstable();
+    let mut spare = vec![false; part.points.len()];
+    for same in unused.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() > 1) {
+        same.iter().for_each(|&(_, vertex)| spare[vertex] = true);
+    }
+    spare
+}
+
+/// The vertices that other ranks may have. Where no rank has ghosts, or cells of a lower dimension
+/// apart from those that they lie in, those are not inside the part: around a vertex of which
+/// another rank has cells there is a face that has a cell here on one side only.
+fn candidates(
+    part: &Part,
+    outer: &BoundaryFaces,
+    held: &[Held],
+    may_lie_inside: bool,
+) -> Vec<Candidate> {
     let count = part.points.len();
     let mut inside = vec![false; count];
-    if !ghosts && part.cells.dimension() == 3 {
+    if !may_lie_inside && part.cells.dimension() == 3 {
         for (_, vertices) in part.cells.iter().filter(|(cell_type, _)| cell_type.dimension() == 3) {
             vertices.iter().for_each(|&vertex| inside[vertex as usize] = true);
         }

@@ -1,13 +1,17 @@
 //! The handedness of the cells of a mesh of which each rank has a part.
 
-use super::{DistributedError, Part};
+use super::DistributedError;
 use crate::communicator::{Communicator, Reduction};
-use crate::mesh::CellType;
+use crate::mesh::{CellType, Cells, Vector};
 
 /// Refuses a mesh whose cells of one type are left-handed on one rank and right-handed on another:
 /// each rank has turned its own, and on one process the mesh would not be sound. Collective.
-pub(super) fn check(communicator: &dyn Communicator, part: &Part) -> Result<(), DistributedError> {
-    let given = part.cells.given_hands(&part.points);
+pub(super) fn check(
+    communicator: &dyn Communicator,
+    cells: &Cells,
+    points: &[Vector],
+) -> Result<(), DistributedError> {
+    let given = cells.given_hands(points);
     let rank = communicator.rank() as u64;
     let of_type =
         |types: &Vec<CellType>, cell_type| if types.contains(&cell_type) { rank } else { u64::MAX };

@@ -17,8 +17,8 @@ use crate::communicator::{Communicator, Message, Reader, Reduction, Writer};
 pub(super) struct Twin {
     pub(super) rank: u32,
     pub(super) vertex: u32,
-    /// Whether it belongs to a cell of that rank's own.
-    pub(super) held: bool,
+    /// What that rank has around it.
+    pub(super) held: Held,
 }
 
 /// The vertices of this rank that others have too, rising, each with what the others call it, by
@@ -43,17 +43,35 @@ fn dealt_to(name: u64, size: usize) -> usize {
     (scatter(name) % size as u64) as usize
 }
 
-/// A vertex and whether it belongs to a cell of this rank's own.
-pub(super) type Candidate = (u32, bool);
+/// What of its own a rank has around a vertex. The owner is among those that have the most, which
+/// comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Held {
+    /// A cell of the mesh's dimension.
+    Whole,
+    /// Cells of a lower dimension alone: lines or faces in a mesh of volumes.
+    Lower,
+    /// No cell of its own.
+    Nothing,
+}
 
-const HELD: u32 = 1 << 31;
+/// A vertex and what this rank has around it.
+pub(super) type Candidate = (u32, Held);
+
+/// The bits of a vertex in a message; what is held stands above.
+const VERTEX: u32 = (1 << 30) - 1;
 
 fn packed((vertex, held): Candidate) -> u32 {
-    vertex | if held { HELD } else { 0 }
+    vertex | (held as u32) << 30
 }
 
 fn unpacked(rank: usize, packed: u32) -> Twin {
-    Twin { rank: index(rank), vertex: packed & !HELD, held: packed & HELD != 0 }
+    let held = match packed >> 30 {
+        0 => Held::Whole,
+        1 => Held::Lower,
+        _ => Held::Nothing,
+    };
+    Twin { rank: index(rank), vertex: packed & VERTEX, held }
 }
 
 /// Vertices of one global number. Collective; what is wrong on this rank alone is not agreed upon

@@ -246,6 +246,44 @@ fn cells_run_the_same_way_round_on_all_ranks() {
     }
 }
 
+/// A cell that is turned inside out is not taken for one of a program with left-handed cells because
+/// it is the only one that its rank owns.
+#[test]
+fn a_rank_does_not_turn_its_only_cell() {
+    let plain = box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
+    let mut cells = Cells::new();
+    for (cell, (cell_type, vertices)) in plain.cells().iter().enumerate() {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|index| vertices[index]);
+        let turned = if cell == 5 { [b, a, c, d] } else { [a, b, c, d] };
+        cells.push(cell_type, &turned).unwrap();
+    }
+    let mesh = Mesh::new(plain.points().to_vec(), cells, FeatureSource::SharpEdges).unwrap();
+    let outcomes = threads::run(2, |ranks| {
+        let part = Part::cut(&mesh, &[0, 0, 0, 0, 0, 1], ranks.rank(), true).unwrap();
+        let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+        domain(&ranks, &part, &FeatureSettings::default()).map(drop)
+    });
+    for outcome in outcomes {
+        assert!(matches!(outcome, Err(DistributedError::Hands { .. })), "{outcome:?}");
+    }
+}
+
+/// Arrays may be longer than what cells use of them.
+#[test]
+fn points_that_no_cell_has_are_no_doubt() {
+    let mesh = box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]);
+    let of_cells = dealt(&mesh, 2, None);
+    threads::run(2, |ranks| {
+        let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
+        (part.global_vertices, part.global_cells) = (None, None);
+        let used = part.points.len();
+        part.points.resize(used + 3, [0.0; 3]);
+        let ranks: Arc<dyn Communicator> = Arc::new(ranks);
+        let shared = SharedVertices::find(&ranks, &part).unwrap();
+        assert_eq!(shared.count(), mesh.points().len() as u64 + 6);
+    });
+}
+
 #[test]
 fn a_rank_hears_of_its_neighbours_alone() {
     // Slabs in a row: however many there are, one in the middle speaks to two others of what lies

@@ -1,5 +1,7 @@
 //! Handles: which vertices of a surface an edit moves and which it holds.
 
+use std::collections::BTreeSet;
+
 use super::error::{EditError, Surroundings};
 use super::kinds::{Displacement, Edit};
 use super::region::Region;
@@ -153,7 +155,7 @@ impl Finder<'_> {
         let found = names
             .iter()
             .map(|name| features.index(name))
-            .collect::<Result<Vec<u32>, _>>()
+            .collect::<Result<BTreeSet<u32>, _>>()
             .map_err(|source| EditError::UnknownFeature {
                 edit: self.index,
                 name: self.edit.name(),

@@ -441,7 +441,7 @@ impl Edit {
         edit
     }
 
-    /// How many vertices and faces it lists: what it takes to hold it.
+    /// How many vertices, faces and features it lists: what it takes to hold it.
     #[must_use]
     pub fn listed(&self) -> usize {
         let faces = |region: Option<&Region>| match region {
@@ -453,7 +453,8 @@ impl Edit {
             Edit::Skeleton(edit) => edit.moves.len(),
             _ => 0,
         };
-        own + faces(self.region()) + faces(self.fixed_region())
+        let features = self.features().len() + self.fixed().len();
+        own + features + faces(self.region()) + faces(self.fixed_region())
     }
 
     /// About how many bytes of memory it takes.

@@ -1,6 +1,6 @@
 //! The faces of cells, one cell after the other.
 
-use super::{CellType, Cells};
+use super::Cells;
 
 /// A face of a cell: the cell and its position among the faces of that cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -20,8 +20,10 @@ pub(crate) fn face_vertices(cells: &Cells, dimension: usize, wanted: CellFace) -
     found
 }
 
-/// The four lowest vertices in rising order (`u32::MAX` for a triangle's fourth).
-pub(crate) fn lowest_four(vertices: &[u32]) -> [u32; 4] {
+/// The four lowest of a face's vertices in rising order, `u32::MAX` for a triangle's fourth: the same
+/// for two faces that have the same vertices, whichever of them each begins with.
+#[must_use]
+pub fn lowest_four(vertices: &[u32]) -> [u32; 4] {
     let mut lowest = [u32::MAX; 4];
     for &vertex in vertices {
         let mut carried = vertex;
@@ -35,14 +37,16 @@ pub(crate) fn lowest_four(vertices: &[u32]) -> [u32; 4] {
 }
 
 /// Memory in which the faces of one cell after the other are put together.
-#[derive(Default)]
-pub(crate) struct FaceBuffer {
+#[derive(Debug, Default)]
+pub struct FaceBuffer {
     distinct: Vec<u32>,
 }
 
 impl FaceBuffer {
-    /// Calls `visit` with each face of a cell: its position among them, and its distinct vertices
-    /// in order around. A cell of dimension 2 is its own face; a strip has its triangles for faces.
+    /// Calls `visit` with each face of a cell of this dimension, and with none of another: its
+    /// position among them, and its distinct vertices in order around. Faces that have collapsed to
+    /// fewer than three vertices are passed over. A cell of dimension 2 is its own face; a strip has
+    /// its triangles for faces.
     pub fn for_each(
         &mut self,
         cells: &Cells,
@@ -50,12 +54,11 @@ impl FaceBuffer {
         dimension: usize,
         mut visit: impl FnMut(u32, &[u32]),
     ) {
-        let cell_type = cells.cell_type(cell);
-        if cell_type.dimension() != dimension {
+        if cells.cell_type(cell).dimension() != dimension {
             return;
         }
         let mut position = 0;
-        let mut take = |face: &[u32]| {
+        let take = |face: &[u32]| {
             if (1..face.len()).all(|end| !face[..end].contains(&face[end])) {
                 visit(position, face);
             } else {
@@ -73,19 +76,8 @@ impl FaceBuffer {
         };
         if dimension == 3 {
             cells.for_each_face(cell, take);
-            return;
-        }
-        match (cell_type, cells.vertices(cell)) {
-            (CellType::Pixel, &[a, b, c, d]) => take(&[a, b, d, c]),
-            (CellType::TriangleStrip, vertices) => {
-                for (start, triple) in vertices.windows(3).enumerate() {
-                    match *triple {
-                        [a, b, c] if start % 2 == 1 => take(&[b, a, c]),
-                        _ => take(triple),
-                    }
-                }
-            }
-            (_, vertices) => take(vertices),
+        } else {
+            cells.for_each_polygon(cell, take);
         }
     }
 }

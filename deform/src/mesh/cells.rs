@@ -293,6 +293,36 @@ impl Cells {
         }
     }
 
+    /// Calls `visit` with each polygon of a cell of dimension 2: global vertex numbers in order
+    /// around, all turned as the cell is. A triangle strip has one for each of its triangles, any
+    /// other such cell is one polygon.
+    ///
+    /// ```
+    /// use tombolo_deform::mesh::{CellType, Cells};
+    ///
+    /// let mut cells = Cells::new();
+    /// cells.push(CellType::TriangleStrip, &[4, 5, 6, 7])?;
+    /// let mut triangles = Vec::new();
+    /// cells.for_each_polygon(0, |polygon| triangles.push(polygon.to_vec()));
+    /// assert_eq!(triangles, [[4, 5, 6], [6, 5, 7]]);
+    /// # Ok::<(), tombolo_deform::mesh::MeshError>(())
+    /// ```
+    pub fn for_each_polygon(&self, cell: usize, mut visit: impl FnMut(&[u32])) {
+        match (self.types[cell], self.vertices(cell)) {
+            (CellType::Triangle | CellType::Quad | CellType::Polygon, vertices) => visit(vertices),
+            (CellType::Pixel, &[a, b, c, d]) => visit(&[a, b, d, c]),
+            (CellType::TriangleStrip, vertices) => {
+                for (start, triangle) in vertices.windows(3).enumerate() {
+                    match *triangle {
+                        [a, b, c] if start % 2 == 1 => visit(&[b, a, c]),
+                        _ => visit(triangle),
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
     /// The faces of a polyhedron; empty for any other cell.
     #[must_use]
     pub fn polyhedron_faces(&self, cell: usize) -> &[Vec<u32>] {

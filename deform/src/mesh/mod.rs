@@ -24,7 +24,8 @@ mod view_check;
 
 pub use crate::vector::Vector;
 pub use array::{ArrayView, NumberType, Values};
-pub(crate) use cell_faces::{CellFace, FaceBuffer, face_vertices, lowest_four, sorted};
+pub(crate) use cell_faces::{CellFace, face_vertices, sorted};
+pub use cell_faces::{FaceBuffer, lowest_four};
 pub use cell_type::CellType;
 pub use cells::Cells;
 pub use domain::Domain;

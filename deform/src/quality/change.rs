@@ -9,7 +9,7 @@ use crate::mesh::cell_geometry::Scratch;
 use crate::mesh::cell_geometry::tet_determinant;
 use crate::mesh::{CellType, Cells, Domain, Vector};
 use crate::parallel;
-use crate::vector::{cross, dot, mean, subtract};
+use crate::vector::{cross, dot, length, mean, subtract};
 
 /// How the cells of a mesh have changed since its reference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -108,11 +108,14 @@ fn volume(measure: &Measure<'_>, cell: usize, points: &[Vector], scratch: &mut S
     if let (CellType::Tetra, &[a, b, c, d]) = (cells.cell_type(cell), vertices) {
         return tet_determinant([a, b, c, d].map(|vertex| points[vertex as usize])) / 6.0;
     }
-    scratch.points.clear();
     if cells.cell_type(cell).dimension() == 2 {
-        scratch.points.extend(vertices.iter().map(|&vertex| points[vertex as usize]));
-        let area = crate::mesh::cell_geometry::vector_area(&scratch.points);
-        return 0.5 * dot(area, area).sqrt();
+        let mut sum = 0.0;
+        cells.for_each_polygon(cell, |polygon| {
+            scratch.points.clear();
+            scratch.points.extend(polygon.iter().map(|&vertex| points[vertex as usize]));
+            sum += 0.5 * length(crate::mesh::cell_geometry::vector_area(&scratch.points));
+        });
+        return sum;
     }
     let centre = mean(vertices.iter().map(|&vertex| points[vertex as usize]));
     let mut sum = 0.0;

@@ -38,9 +38,7 @@ pub(super) fn folded_faces(
     if let Some(faces) = domain.boundary_faces() {
         faces.iter().for_each(|(_, face)| look(face));
     } else if cells.dimension() == 2 {
-        (0..cells.len())
-            .filter(|&cell| cells.cell_type(cell).dimension() == 2)
-            .for_each(|cell| look(cells.vertices(cell)));
+        (0..cells.len()).for_each(|cell| cells.for_each_polygon(cell, &mut look));
     } else {
         for_each_boundary_face(cells, look);
     }

@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Guard {
-    /// The least scaled Jacobian that any cell may have in any shape handed to the solver: 1 is the
-    /// ideal cell, 0 a flat one. A mesh with worse cells to begin with may not get worse than it
-    /// was. From 0 up to 1.
+    /// The least scaled Jacobian that any cell may have in any shape of a schedule: 1 is the ideal
+    /// cell, 0 a flat one. Between two shapes no cell is turned inside out, but it may come below
+    /// this, as where a schedule of few shapes turns the mesh by much. A mesh with worse cells to
+    /// begin with may not get worse than it was. From 0 up to 1.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-label" = "least quality"))]
     pub min_scaled_jacobian: f64,
     /// The answer to a change of shape that does not keep to it.

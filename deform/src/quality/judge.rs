@@ -151,6 +151,23 @@ fn check_arguments(
     fractions: &[f64],
     guard: &Guard,
 ) -> Result<(), Refusal> {
+    check_ends(mesh, start, end)?;
+    let mut before = 0.0;
+    for (index, &value) in fractions.iter().enumerate() {
+        if !(value > before && value <= 1.0) {
+            return Err(Refusal::Fraction { index, value });
+        }
+        before = value;
+    }
+    if !(0.0..=1.0).contains(&guard.min_scaled_jacobian) {
+        return Err(Refusal::Floor { value: guard.min_scaled_jacobian });
+    }
+    Ok(())
+}
+
+/// Refuses shapes of another number of points than the mesh has, and coordinates that are not
+/// finite.
+pub(crate) fn check_ends(mesh: &Mesh, start: &[Vector], end: &[Vector]) -> Result<(), Refusal> {
     let expected = mesh.points().len();
     for (which, shape) in [("start", start), ("end", end)] {
         if shape.len() != expected {
@@ -161,16 +178,6 @@ fn check_arguments(
         {
             return Err(Refusal::NotFinite { which, vertex, point: shape[vertex] });
         }
-    }
-    let mut before = 0.0;
-    for (index, &value) in fractions.iter().enumerate() {
-        if !(value > before && value <= 1.0) {
-            return Err(Refusal::Fraction { index, value });
-        }
-        before = value;
-    }
-    if !(0.0..=1.0).contains(&guard.min_scaled_jacobian) {
-        return Err(Refusal::Floor { value: guard.min_scaled_jacobian });
     }
     Ok(())
 }

@@ -27,6 +27,7 @@ use crate::number::real;
 pub use change::{Change, Spread, change, volumes};
 pub use fold::turns_over;
 pub use guard::{Guard, Otherwise, SurfaceRule};
+pub(crate) use judge::check_ends;
 pub use judge::{PathQuality, ShapeQuality, judge, judge_unless, keeps, shape_at};
 pub use refusal::{BrokenPath, FailingCell, Refusal};
 

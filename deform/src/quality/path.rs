@@ -34,9 +34,15 @@ pub(super) fn least_on_path(
         into.extend(vertices.iter().map(|&vertex| points[vertex as usize]));
     };
     if cells.cell_type(cell).dimension() == 2 {
-        gather(start, &mut first.points);
-        gather(end, &mut last.points);
-        return least_of_polygon(&first.points, &last.points, until);
+        let mut least = Least::NONE;
+        cells.for_each_polygon(cell, |polygon| {
+            for (points, into) in [(start, &mut first.points), (end, &mut last.points)] {
+                into.clear();
+                into.extend(polygon.iter().map(|&vertex| points[vertex as usize]));
+            }
+            least = least.worse(least_of_polygon(&first.points, &last.points, until));
+        });
+        return least;
     }
     corner_tets(cells, cell, |vertex| start[vertex as usize], &mut first.tets);
     corner_tets(cells, cell, |vertex| end[vertex as usize], &mut last.tets);

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::mesh::{FeatureSource, Mesh};
 use crate::shapes;
+use crate::vector::scale;
 
 #[derive(serde::Deserialize)]
 struct Row {
@@ -344,5 +345,27 @@ proptest! {
             }
             Err(other) => prop_assert!(false, "{other}"),
         }
+    }
+}
+
+/// Pixels and strips list their vertices in another order than around them.
+#[test]
+fn every_cell_of_dimension_2_is_judged_around() {
+    for (cell_type, area) in [
+        (CellType::Triangle, 0.5),
+        (CellType::Quad, 1.0),
+        (CellType::Pixel, 1.0),
+        (CellType::TriangleStrip, 1.0),
+    ] {
+        let mesh = shapes::single_cell(cell_type);
+        let measured = volumes(mesh.cells(), mesh.points());
+        assert!((measured[0] - area).abs() < 1e-14, "{cell_type}: {measured:?}");
+        let larger: Vec<Vector> = mesh.points().iter().map(|&point| scale(point, 1.5)).collect();
+        let guard = Guard::default();
+        judge(&mesh, mesh.points(), &larger, &[0.5, 1.0], &guard).expect("it only grows");
+        // The first corner goes over to the other side.
+        let mut over = mesh.points().to_vec();
+        over[0] = [2.0, 2.0, 0.0];
+        assert!(judge(&mesh, mesh.points(), &over, &[1.0], &guard).is_err(), "{cell_type}");
     }
 }

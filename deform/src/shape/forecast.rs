@@ -28,7 +28,7 @@ pub struct Forecast {
     /// The fraction that would be done; of an order that would be rejected, the fraction that would
     /// pass, where it is known.
     pub fraction: Option<f64>,
-    /// The least scaled Jacobian on the way.
+    /// The least scaled Jacobian of the shapes on the way.
     pub min_scaled_jacobian: Option<f64>,
     /// The place at which it would fail, where that is known: the worst cell before the change, or
     /// the first face of the surface that is broken.

@@ -5,7 +5,7 @@ use std::{cell::OnceCell, sync::Arc};
 use crate::{
     edit::{Advance, Edit, Editor},
     mesh::Vector,
-    quality::{Guard, Otherwise, SurfaceRule, turns_over},
+    quality::{Guard, Otherwise, SurfaceRule, check_ends, turns_over},
     schedule::Schedule,
     volume::{BoundaryMotion, FollowError, Route, Untangler, Volume, follow, with_boundary},
 };
@@ -173,7 +173,7 @@ impl Shaper {
             }
             Otherwise::Clamp => self.clamped(request),
             _ => {
-                let target = self.target(stack, deformation, guard.surface)?;
+                let target = self.target(stack, deformation, guard)?;
                 self.go(start, &target, schedule, guard)
             }
         }
@@ -194,6 +194,8 @@ impl Shaper {
         self.body.require_wanted()?;
         let watch = self.stopwatch();
         if target.surface_only || start.surface_only {
+            let ends = check_ends(self.body.domain.mesh(), &start.points, &target.points);
+            self.body.agree(ends.map_err(Refused::from))?;
             let plan = self.along_surface(start, target, schedule, guard);
             let spent = watch.seconds();
             self.spent.guard += spent;
@@ -225,7 +227,7 @@ impl Shaper {
             if let Some(found) = self.mended.iter().find(known) {
                 break Target { seconds: ShapeSeconds::default(), ..found.target.clone() };
             }
-            let mut linear = match self.target(&stack[..lower], deform, guard.surface) {
+            let mut linear = match self.target(&stack[..lower], deform, guard) {
                 // Followed in sub-steps, the surface may come out sound, and a solve that broke
                 // down may be smaller ones that do not.
                 Err(refused) if (refused.is_surface() || refused.breaks_down()) && lower > 0 => {
@@ -354,7 +356,7 @@ impl Shaper {
     fn clamped(&mut self, request: &Request) -> Result<Plan, Refused> {
         let Request { stack, kept, start, deformation: deform, schedule, guard } = request;
         let kept = *kept;
-        let whole = self.target(stack, deform, guard.surface);
+        let whole = self.target(stack, deform, guard);
         let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
             Err(refused)
                 if (refused.is_quality() || refused.is_surface()) && kept < stack.len() =>
@@ -371,7 +373,7 @@ impl Shaper {
                     |(index, edit)| if index < kept { edit.clone() } else { edit.scaled(fraction) },
                 )
                 .collect();
-            let target = self.target(&scaled, deform, guard.surface);
+            let target = self.target(&scaled, deform, guard);
             match target
                 .and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard))
             {

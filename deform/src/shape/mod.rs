@@ -330,7 +330,7 @@ impl Shaper {
     }
 
     /// The shape that `stack` makes, measured from the reference mesh. Its surface is held to
-    /// `rule` before any volume work; the volume is not judged yet.
+    /// the guard's rule before any volume work; the volume is not judged yet.
     ///
     /// # Errors
     /// [`Refused::Edit`], [`Refused::Surface`], [`Refused::Feature`], [`Refused::Volume`],
@@ -339,8 +339,9 @@ impl Shaper {
         &mut self,
         stack: &[Edit],
         deform: &Deformation,
-        rule: SurfaceRule,
+        guard: &Guard,
     ) -> Result<Target, Refused> {
+        let rule = guard.surface;
         check_stack(stack)?;
         deform.equation.validate()?;
         self.body.require_wanted()?;
@@ -381,8 +382,9 @@ impl Shaper {
                 reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
             let mut points: Vec<Vector> = moved.collect();
             body.update(&mut points);
-            let improved =
-                self.improved(&points, deform).filter(|improved| self.straight(improved));
+            let improved = self
+                .improved(&points, deform)
+                .filter(|improved| self.may_replace(improved, &points, guard));
             (improved.unwrap_or_else(|| points.into()), solution.iterations)
         });
         seconds.volume = watch.seconds();
@@ -415,10 +417,15 @@ impl Shaper {
         Some(points.into())
     }
 
-    /// Whether every cell stays valid on the straight way from the reference.
-    fn straight(&self, points: &[Vector]) -> bool {
-        let guard = Guard { min_scaled_jacobian: 0.0, ..Guard::default() };
-        self.body.keeps(&self.reference, points, &guard)
+    /// Whether an improved shape may stand for that of the solve: the guard lets it through, or
+    /// neither, and every cell stays valid on the straight way from the reference. What is lifted is
+    /// the part of its quality that a cell has kept: one that was poor in the reference may lose some
+    /// of it, and fall below the guard's floor.
+    fn may_replace(&self, improved: &[Vector], points: &[Vector], guard: &Guard) -> bool {
+        let valid = Guard { min_scaled_jacobian: 0.0, ..Guard::default() };
+        let keeps =
+            |points: &[Vector], guard: &Guard| self.body.keeps(&self.reference, points, guard);
+        keeps(improved, guard) || (!keeps(points, guard) && keeps(improved, &valid))
     }
 }
 

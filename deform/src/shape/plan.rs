@@ -166,8 +166,8 @@ impl Plan {
         (before, (before + 1).min(self.shapes()), position - f64::from(before))
     }
 
-    /// The least and the mean scaled Jacobian at a position on the way; between two shapes those of
-    /// the worse one. `None` at the start, and where the volume was not judged.
+    /// The least and the mean scaled Jacobian at a shape of the way; between two shapes those of the
+    /// worse one, though the mesh may be worse there than at both. `None` at the start, and where the volume was not judged.
     #[must_use]
     pub fn quality_at(&self, position: f64) -> Option<(f64, f64)> {
         let (before, after, fraction) = self.between(position);
@@ -212,7 +212,7 @@ impl Plan {
         if self.surface_only { Judged::Surface } else { Judged::Volume }
     }
 
-    /// The least scaled Jacobian on the way; `None` where the volume was not judged.
+    /// The least scaled Jacobian of the shapes on the way; `None` where the volume was not judged.
     #[must_use]
     pub fn min_scaled_jacobian(&self) -> Option<f64> {
         (!self.surface_only).then_some(self.quality.min_scaled_jacobian)

@@ -14,6 +14,7 @@ use crate::communicator::{Communicator, threads};
 use crate::distributed::tests::{dealt, renumbered};
 use crate::distributed::{Part, domain};
 use crate::features::FeatureSettings;
+use crate::mesh::{CellType, Cells, FeatureSource};
 
 /// How a mesh is dealt out.
 #[derive(Clone, Copy)]
@@ -147,6 +148,87 @@ fn shapes_are_those_of_one_process() {
                 assert_eq!(back.end(), shaper.reference());
             });
         }
+    }
+}
+
+/// A line between vertices inside of the volume is passed over, whoever has it.
+#[test]
+fn lines_that_another_rank_has_change_no_shape() {
+    let plain = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let is_inside =
+        |vertex: &u32| plain.points()[*vertex as usize].iter().all(|&x| x > 0.1 && x < 0.9);
+    let inside: Vec<u32> = (0..plain.points().len() as u32).filter(is_inside).collect();
+    let mut cells = plain.cells().clone();
+    cells.push(CellType::Line, &inside[..2]).unwrap();
+    let mesh = Mesh::new(plain.points().to_vec(), cells, plain.features().clone()).unwrap();
+    let edits = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.05, 0.02, -0.2]}}]),
+    );
+    let deform = tight(json!({}));
+    let mut serial = alone(&mesh);
+    let plan = serial.plan(&asked(&serial, &edits, &deform)).unwrap();
+    let mut of_cells = vec![1; mesh.cells().len()];
+    of_cells[plain.cells().len()] = 0;
+    for ghosts in [false, true] {
+        for numbers in [false, true] {
+            let deal = Deal { ghosts, numbers, ..PLAIN };
+            on_ranks(&mesh, &of_cells, deal, |shaper, numbers| {
+                let found = shaper.plan(&asked(shaper, &edits, &deform)).unwrap();
+                let off = apart(found.end(), numbers, plan.end());
+                assert!(off <= 1e-8, "ghosts {ghosts}: {off:e}");
+            });
+        }
+    }
+}
+
+/// A mesh of faces is judged on several ranks as on one process.
+#[test]
+fn faces_are_judged_in_parts_too() {
+    let points: Vec<Vector> =
+        (0..9).map(|vertex| [f64::from(vertex % 3), f64::from(vertex / 3), 0.0]).collect();
+    let mut cells = Cells::new();
+    for first in [0, 1, 3, 4] {
+        cells.push(CellType::Quad, &[first, first + 1, first + 4, first + 3]).unwrap();
+    }
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let verdict = |shaper: &mut Shaper, by: f64| {
+        let edits =
+            stack(json!([{"displacement": {"vertices": [4], "values": [[-by, -by, 0.0]]}}]));
+        let asked = asked(shaper, &edits, &Deformation::default());
+        shaper.plan(&asked).map(|plan| plan.quality().min_scaled_jacobian)
+    };
+    for (by, passes) in [(0.1, true), (0.7, false)] {
+        let whole = verdict(&mut alone(&mesh), by);
+        assert_eq!(whole.is_ok(), passes, "{whole:?}");
+        for ghosts in [false, true] {
+            let deal = Deal { ghosts, ..PLAIN };
+            for found in on_ranks(&mesh, &[0, 0, 1, 1], deal, |shaper, _| verdict(shaper, by)) {
+                match (&found, &whole) {
+                    (Ok(found), Ok(whole)) => assert!((found - whole).abs() < 1e-9),
+                    (Err(Refused::Guard(_)), Err(Refused::Guard(_))) => {}
+                    _ => panic!("{found:?}, expected {whole:?}"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_start_of_another_length_is_refused_whatever_follows() {
+    let mut shaper = alone(&box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]));
+    let edits = stack(
+        json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, 0.1]}}]),
+    );
+    for method in [json!({}), json!({"method": "surface"})] {
+        let deformation: Deformation = serde_json::from_value(method).unwrap();
+        let short: Arc<[Vector]> = shaper.reference()[1..].into();
+        let request = Request { deformation, ..Request::new(&edits[..], short) };
+        let found = shaper.plan(&request);
+        let is_told = matches!(
+            &found,
+            Err(Refused::Guard(Refusal::PointCount { which: "start", found: 26, expected: 27 }))
+        );
+        assert!(is_told, "{found:?}");
     }
 }
 

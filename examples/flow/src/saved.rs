@@ -1,12 +1,11 @@
 //! The state of a run in one file: the flow, and the adaptor's checkpoint beside it.
 
-use std::ffi::OsString;
-use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use tombolo::communicator::{Communicator, RankError, Reader, Writer};
 use tombolo::{Checkpoint, CheckpointError};
+use tombolo_pipelines::files::write_durably;
 
 use crate::SolverError;
 use crate::ranks::agreed;
@@ -54,16 +53,14 @@ pub(crate) fn write(
 }
 
 fn replace(file: &Path, states: &[Vec<u8>]) -> io::Result<()> {
-    let mut partial = OsString::from(file);
-    partial.push(".partial");
-    let mut out = File::create(&partial)?;
-    out.write_all(MAGIC)?;
-    for state in states {
-        out.write_all(&(state.len() as u64).to_le_bytes())?;
-        out.write_all(state)?;
-    }
-    out.sync_all()?;
-    std::fs::rename(&partial, file)
+    write_durably(file, |out| {
+        out.write_all(MAGIC)?;
+        for state in states {
+            out.write_all(&(state.len() as u64).to_le_bytes())?;
+            out.write_all(state)?;
+        }
+        Ok(())
+    })
 }
 
 /// This rank's state in a file.

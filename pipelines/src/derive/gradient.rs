@@ -144,6 +144,9 @@ impl Derivatives<'_> {
     ) -> Option<Vec<f64>> {
         let cell_type = self.basis.source.cells().cell_type(cell);
         let points = self.points(cell);
+        if cell_type.dimension() == 1 {
+            return along(&points, components, value);
+        }
         if corners(cell_type).is_empty() {
             return nearest_linear(&points, cell_type.dimension(), components, value);
         }
@@ -165,6 +168,27 @@ fn derivatives(
         all.extend(solve(tangents, shape.slope(|vertex| value(vertex, component)))?);
     }
     Some(all)
+}
+
+/// The gradients along the parts of a line, weighted by the lengths of these; nothing is known across
+/// it. `None` for a line without a length.
+fn along(
+    points: &[Vector],
+    components: usize,
+    value: &dyn Fn(usize, usize) -> f64,
+) -> Option<Vec<f64>> {
+    let parts: Vec<Vector> = points.windows(2).map(|ends| subtract(ends[1], ends[0])).collect();
+    let whole: f64 = parts.iter().map(|part| length(*part)).sum();
+    let mut all = Vec::with_capacity(3 * components);
+    for component in 0..components {
+        let mut sum = [0.0; 3];
+        for (index, part) in parts.iter().enumerate().filter(|(_, part)| length(**part) > 0.0) {
+            let rise = value(index + 1, component) - value(index, component);
+            sum = add(sum, scale(*part, rise / length(*part)));
+        }
+        all.extend(scale(sum, 1.0 / whole));
+    }
+    (whole > 0.0).then_some(all)
 }
 
 /// The gradient of the linear function with the least squares of differences at the points.

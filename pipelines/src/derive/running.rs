@@ -62,6 +62,17 @@ impl Block {
         self.largest.iter_mut().zip(to).for_each(|(most, value)| *most = greater(*most, *value));
     }
 
+    /// Whether it has what these measures of so many values need.
+    fn fits(&self, measures: &[Measure], count: usize) -> bool {
+        let fits = |measure: Measure, part: &[f64]| {
+            part.len() == if measures.contains(&measure) { count } else { 0 }
+        };
+        fits(Measure::Mean, &self.integral)
+            && fits(Measure::Rms, &self.squares)
+            && fits(Measure::Min, &self.least)
+            && fits(Measure::Max, &self.largest)
+    }
+
     fn bytes(&self) -> usize {
         let all = [&self.integral, &self.squares, &self.least, &self.largest];
         all.iter().map(|part| part.capacity() * size_of::<f64>()).sum()
@@ -215,7 +226,8 @@ pub(crate) fn follow(
             Ok(Some(operand)) => operand.view.values.len() * components,
             _ => 0,
         };
-        let fits = running.last.as_ref().is_some_and(|(_, values)| values.len() == count);
+        let fits = running.last.as_ref().is_some_and(|(_, values)| values.len() == count)
+            && running.blocks.iter().all(|block| block.fits(&stage.measures, count));
         running.of = of.filter(|_| fits);
     }
     if basis.communicator.any(running.of != of) {

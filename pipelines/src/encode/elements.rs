@@ -21,27 +21,16 @@ impl Elements {
         let mut elements = Self::default();
         let Self { triangles, lines, triangle_cells, line_cells } = &mut elements;
         for (cell, (cell_type, points)) in extract.cells.iter().enumerate() {
-            match (cell_type, points) {
-                (CellType::Vertex | CellType::PolyVertex, _) => {}
-                (CellType::Line | CellType::PolyLine, _) => {
+            match cell_type {
+                CellType::Vertex | CellType::PolyVertex => {}
+                CellType::Line | CellType::PolyLine => {
                     lines.extend(points.windows(2).map(|line| [line[0], line[1]]))
                 }
-                (CellType::Pixel, &[a, b, c, d]) => triangles.extend([[a, b, d], [a, d, c]]),
-                (CellType::TriangleStrip, _) => {
-                    for (index, strip) in points.windows(3).enumerate() {
-                        let odd = index % 2 == 1;
-                        triangles.push(if odd {
-                            [strip[1], strip[0], strip[2]]
-                        } else {
-                            [strip[0], strip[1], strip[2]]
-                        });
-                    }
-                }
-                (
-                    CellType::Triangle | CellType::Quad | CellType::Polygon,
-                    &[first, ref rest @ ..],
-                ) => {
-                    triangles.extend(rest.windows(2).map(|edge| [first, edge[0], edge[1]]));
+                _ if cell_type.dimension() == 2 => {
+                    extract.cells.for_each_polygon(cell, |polygon| {
+                        let ends = polygon[1..].windows(2);
+                        triangles.extend(ends.map(|ends| [polygon[0], ends[0], ends[1]]));
+                    })
                 }
                 _ => return Err(EncodeError::VolumeCell { cell, cell_type }),
             }

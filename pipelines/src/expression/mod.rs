@@ -37,6 +37,15 @@ pub struct Expression {
     program: Vec<Operation>,
 }
 
+/// A name that a formula uses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct UsedName {
+    /// The name.
+    pub name: String,
+    /// The column of its first character where it stands first, from 1.
+    pub column: usize,
+}
+
 /// Why a formula was refused, and where.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("column {column} of the formula: {message}{}", suggestion.as_deref().map_or_else(String::new, |name| format!("; did you mean `{name}`?")))]
@@ -87,14 +96,14 @@ impl Expression {
     /// As [`parse`](Self::parse).
     pub fn parse_open(text: &str) -> Result<(Self, Vec<String>), ExpressionError> {
         let (program, names) = parse_open(text, Kind::Number)?;
-        Ok((Self { program }, names))
+        Ok((Self { program }, names.into_iter().map(|used| used.name).collect()))
     }
 
     /// Parses a condition that may use any name, and returns the names that it uses.
     ///
     /// # Errors
     /// As [`parse`](Self::parse).
-    pub fn parse_open_condition(text: &str) -> Result<(Self, Vec<String>), ExpressionError> {
+    pub fn parse_open_condition(text: &str) -> Result<(Self, Vec<UsedName>), ExpressionError> {
         let (program, names) = parse_open(text, Kind::Condition)?;
         Ok((Self { program }, names))
     }
@@ -123,6 +132,17 @@ mod tests {
         Expression::parse(text, &["x", "y"])
             .unwrap_or_else(|error| panic!("{text}: {error}"))
             .evaluate(&[3.0, 5.0])
+    }
+
+    #[test]
+    fn no_comparison_with_nan_holds() {
+        for operator in ["==", "!=", "<", "<=", ">", ">="] {
+            let text = format!("x {operator} 0");
+            let condition = Expression::parse_condition(&text, &["x"]).unwrap();
+            assert!(!condition.holds(&[f64::NAN]), "{text}");
+        }
+        let differs = Expression::parse_condition("x != 3", &["x"]).unwrap();
+        assert_eq!([2.0, 3.0, 4.0].map(|x| differs.holds(&[x])), [true, false, true]);
     }
 
     #[test]

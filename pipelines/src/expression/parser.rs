@@ -2,8 +2,8 @@
 
 use tombolo_deform::names::nearest;
 
-use super::ExpressionError;
 use super::program::{Operation, STACK, UNARY};
+use super::{ExpressionError, UsedName};
 use crate::limits::{FORMULA, FORMULA_DEPTH};
 
 /// The functions of more than one number.
@@ -30,7 +30,7 @@ pub(super) fn parse(
 pub(super) fn parse_open(
     text: &str,
     expected: Kind,
-) -> Result<(Vec<Operation>, Vec<String>), ExpressionError> {
+) -> Result<(Vec<Operation>, Vec<UsedName>), ExpressionError> {
     let parser = Parser { found_names: Some(Vec::new()), ..Parser::new(text, &[]) };
     let parser = parsed(parser, expected)?;
     Ok((parser.program, parser.found_names.unwrap_or_default()))
@@ -57,7 +57,7 @@ struct Parser<'a> {
     at: usize,
     names: &'a [&'a str],
     /// The names found so far, where any may be used.
-    found_names: Option<Vec<String>>,
+    found_names: Option<Vec<UsedName>>,
     program: Vec<Operation>,
     depth: usize,
     stack: usize,
@@ -107,9 +107,13 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// The column of a byte of the text, from 1.
+    fn column(&self, at: usize) -> usize {
+        self.text.get(..at).map_or(0, |before| before.chars().count()) + 1
+    }
+
     fn error(&self, at: usize, message: String) -> ExpressionError {
-        let column = self.text.get(..at).map_or(0, |before| before.chars().count()) + 1;
-        ExpressionError { column, message, suggestion: None }
+        ExpressionError { column: self.column(at), message, suggestion: None }
     }
 
     fn require(&self, found: Kind, expected: Kind, at: usize) -> Result<(), ExpressionError> {
@@ -283,11 +287,12 @@ impl<'a> Parser<'a> {
             self.push(Operation::Value(index), 0, start)?;
         } else if name == "pi" {
             self.push(Operation::Constant(std::f64::consts::PI), 0, start)?;
-        } else if let Some(found) = &mut self.found_names {
-            let index = found.iter().position(|known| known == name).unwrap_or_else(|| {
-                found.push(name.to_owned());
+        } else if let Some(mut found) = self.found_names.take() {
+            let index = found.iter().position(|known| known.name == name).unwrap_or_else(|| {
+                found.push(UsedName { name: name.to_owned(), column: self.column(start) });
                 found.len() - 1
             });
+            self.found_names = Some(found);
             self.push(Operation::Value(index), 0, start)?;
         } else {
             let known =

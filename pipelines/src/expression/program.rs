@@ -1,5 +1,7 @@
 //! The operations of a formula, for a stack of fixed size, and how they are carried out.
 
+use std::cmp::Ordering;
+
 /// How many intermediate results a formula may need at once.
 pub(super) const STACK: usize = 32;
 
@@ -92,7 +94,10 @@ pub(super) fn evaluate(program: &[Operation], values: &[f64]) -> f64 {
             Operation::Greater => binary!(|a, b| f64::from(u8::from(a > b))),
             Operation::GreaterEqual => binary!(|a, b| f64::from(u8::from(a >= b))),
             Operation::Equal => binary!(|a, b| f64::from(u8::from(a == b))),
-            Operation::NotEqual => binary!(|a, b| f64::from(u8::from(a != b))),
+            // Of NaN nothing is known: it differs from nothing either.
+            Operation::NotEqual => binary!(|a, b| {
+                f64::from(u8::from(a.partial_cmp(&b).is_some_and(Ordering::is_ne)))
+            }),
             Operation::And => binary!(|a, b| f64::from(u8::from(a != 0.0 && b != 0.0))),
             Operation::Or => binary!(|a, b| f64::from(u8::from(a != 0.0 || b != 0.0))),
             Operation::Minimum => binary!(|a, b| if a.is_nan() || a < b { a } else { b }),

@@ -139,12 +139,10 @@ impl Sides {
     /// Whether these vertices lie on both sides, and none of them on neither.
     #[inline]
     pub(super) fn are_crossed(&self, vertices: &[u32]) -> bool {
-        let (mut behind, mut ahead) = (0, 0);
-        for &vertex in vertices {
-            behind += usize::from(self.is_behind(vertex));
-            ahead += usize::from(self.is_ahead(vertex));
-        }
-        behind > 0 && ahead > 0 && behind + ahead == vertices.len()
+        let ahead = vertices.iter().filter(|&&vertex| self.is_ahead(vertex)).count();
+        // Those that are not ahead are looked at where there are some of both: few cells are crossed.
+        let is_known = |&vertex: &u32| self.is_ahead(vertex) || self.is_behind(vertex);
+        ahead > 0 && ahead < vertices.len() && vertices.iter().all(is_known)
     }
 
     /// Whether a block has vertices behind, ahead, and on neither side.

@@ -4,7 +4,7 @@
 //! several functions these are decomposed in turn, by the names of their points.
 
 use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
-use tombolo_deform::vector::{add, determinant, scale, subtract};
+use tombolo_deform::vector::{add, cross, determinant, dot, scale, subtract};
 
 use super::cut::{ByVertices, mixed};
 use super::decompose::Faces;
@@ -74,6 +74,8 @@ pub(super) struct Clipper<'a> {
     between: ByVertices<(u32, u32, usize)>,
     faces: Faces,
     simplices: Vec<[u32; 4]>,
+    /// The normal of the triangle that is clipped, where the cell is a face.
+    normal: Vector,
     /// The points of the cell that is taken whole.
     points_of_cell: Vec<u32>,
     cell: u32,
@@ -112,6 +114,7 @@ impl<'a> Clipper<'a> {
             between: ByVertices::default(),
             faces: Faces::default(),
             simplices: Vec::new(),
+            normal: [0.0; 3],
             points_of_cell: Vec::new(),
             cell: 0,
             made: Cells::new(),
@@ -176,6 +179,10 @@ impl<'a> Clipper<'a> {
         self.faces.decompose(self.cells, cell, key, &mut simplices);
         let cell_type = if dimension == 3 { CellType::Tetra } else { CellType::Triangle };
         for simplex in &simplices {
+            if let &[a, b, c, u32::MAX] = simplex {
+                let [a, b, c] = [a, b, c].map(|vertex| self.points[vertex as usize]);
+                self.normal = cross(subtract(b, a), subtract(c, a));
+            }
             let nodes = simplex.map(|v| if v == u32::MAX { v } else { self.vertex(v) });
             self.simplex(Piece::new(cell_type, &nodes), 0)?;
         }
@@ -399,7 +406,7 @@ impl<'a> Clipper<'a> {
         }
     }
 
-    /// Appends a piece, turned right-handed.
+    /// Appends a piece, turned right-handed, or of a face as the face is.
     fn push(&mut self, piece: &Piece) -> Result<(), MeshError> {
         let at = |local: usize| self.position(piece.nodes[local]);
         let along = |from: usize, to: usize| subtract(at(to), at(from));
@@ -411,12 +418,12 @@ impl<'a> Clipper<'a> {
                 along(0, 2),
                 add(along(0, 3), add(along(1, 4), along(2, 5))),
             ),
-            _ => 1.0,
+            _ => dot(cross(along(0, 1), along(0, 2)), self.normal),
         };
         let mut nodes = piece.nodes;
         if volume < 0.0 {
             match piece.cell_type {
-                CellType::Pyramid => nodes.swap(1, 3),
+                CellType::Pyramid | CellType::Quad => nodes.swap(1, 3),
                 CellType::Wedge => {
                     nodes.swap(1, 2);
                     nodes.swap(4, 5);

@@ -184,13 +184,7 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
                 self.close(cell)
             }
             2 => {
-                match (cell_type, vertices) {
-                    (CellType::Pixel, &[a, b, c, d]) => self.face(&[a, b, d, c]),
-                    (CellType::TriangleStrip, _) => {
-                        vertices.windows(3).for_each(|triangle| self.face(triangle))
-                    }
-                    _ => self.face(vertices),
-                }
+                cells.for_each_polygon(cell, |polygon| self.face(polygon));
                 for (from, to) in std::mem::take(&mut self.segments) {
                     if from != to {
                         self.push(CellType::Line, &[from, to], cell)?;
@@ -228,7 +222,8 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
         let mut direction = [0.0; 3];
         for edge in &ring[..count] {
             polygon.push(self.crossing(*edge));
-            let [behind, ahead] = edge.map(|vertex| self.coordinates[vertex as usize]);
+            let behind = self.coordinates[edge[0] as usize];
+            let ahead = self.coordinates[edge[1] as usize];
             direction = add(direction, subtract(ahead, behind));
         }
         let done = self.push_polygon(&mut polygon, direction, cell);
@@ -266,21 +261,29 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
     /// The number of the point on an edge whose ends lie on two sides.
     fn crossing(&mut self, edge: [u32; 2]) -> u32 {
         let [a, b] = if edge[0] <= edge[1] { edge } else { [edge[1], edge[0]] };
-        let [at_a, at_b] = [a, b].map(|end| (self.value)(end as usize));
+        // Most edges have their point already, and none of their ends is at 0.
+        if let Some(point) = self.known.find([a, b]) {
+            return point;
+        }
+        let (at_a, at_b) = ((self.value)(a as usize), (self.value)(b as usize));
         let edge = match (at_a == 0.0, at_b == 0.0) {
             (true, _) => [a, a],
             (_, true) => [b, b],
             _ => [a, b],
         };
-        if let Some(point) = self.known.find(edge) {
+        if edge[0] == edge[1]
+            && let Some(point) = self.known.find(edge)
+        {
             return point;
         }
         let crossing = Crossing {
             edge,
             fraction: if edge[0] == edge[1] { 0.0 } else { at_a / (at_a - at_b) },
         };
-        let [from, to] = edge.map(|vertex| self.coordinates[vertex as usize]);
-        self.cut.points.push(std::array::from_fn(|axis| crossing.between(from[axis], to[axis])));
+        let from = self.coordinates[edge[0] as usize];
+        let to = self.coordinates[edge[1] as usize];
+        let at = |axis: usize| crossing.between(from[axis], to[axis]);
+        self.cut.points.push([at(0), at(1), at(2)]);
         self.cut.crossings.push(crossing);
         self.cut.layers.push(self.layer);
         self.known.add(edge)

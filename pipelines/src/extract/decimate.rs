@@ -186,30 +186,13 @@ impl Surface {
             gone: Vec::new(),
             points,
         };
-        for (owner, (cell_type, vertices)) in (0..).zip(extract.cells.iter()) {
-            let mut push = |corners: [u32; 3]| {
-                surface.triangles.push(corners);
-                surface.owners.push(owner);
-            };
-            match cell_type {
-                CellType::Triangle | CellType::Quad | CellType::Polygon => {
-                    for pair in vertices[1..].windows(2) {
-                        push([vertices[0], pair[0], pair[1]]);
-                    }
+        for (owner, cell) in (0..).zip(0..extract.cells.len()) {
+            extract.cells.for_each_polygon(cell, |polygon| {
+                for pair in polygon[1..].windows(2) {
+                    surface.triangles.push([polygon[0], pair[0], pair[1]]);
+                    surface.owners.push(owner);
                 }
-                CellType::Pixel => {
-                    let [a, b, c, d] = [0, 1, 3, 2].map(|at| vertices[at]);
-                    push([a, b, c]);
-                    push([a, c, d]);
-                }
-                CellType::TriangleStrip => {
-                    for (index, corners) in vertices.windows(3).enumerate() {
-                        let turned = if index % 2 == 0 { [0, 1, 2] } else { [1, 0, 2] };
-                        push(turned.map(|at| corners[at]));
-                    }
-                }
-                _ => {}
-            }
+            });
         }
         surface.prepare(extract.features.as_deref());
         surface

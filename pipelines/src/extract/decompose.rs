@@ -4,7 +4,7 @@
 //! face, so that two cells decompose the face between them alike (J. Dompierre et al., *How to
 //! subdivide pyramids, prisms and hexahedra into tetrahedra*, 1999).
 
-use tombolo_deform::mesh::{CellType, Cells};
+use tombolo_deform::mesh::Cells;
 
 /// The faces of one cell.
 #[derive(Default)]
@@ -42,13 +42,7 @@ impl Faces {
             cells.for_each_face(cell, |face| self.push(face));
             return self.tetrahedra(key, simplices);
         }
-        match (cells.cell_type(cell), cells.vertices(cell)) {
-            (CellType::Pixel, &[a, b, c, d]) => self.push(&[a, b, d, c]),
-            (CellType::TriangleStrip, vertices) => {
-                vertices.windows(3).for_each(|triangle| self.push(triangle));
-            }
-            (_, vertices) => self.push(vertices),
-        }
+        cells.for_each_polygon(cell, |polygon| self.push(polygon));
         self.triangles(key, simplices);
     }
 

@@ -1,5 +1,6 @@
 //! Why something could not be taken out of a channel.
 
+use tombolo_deform::limits::Exceeded;
 use tombolo_deform::mesh::{MeshError, Vector};
 use tombolo_deform::names::nearest;
 use tombolo_deform::surface::SurfaceError;
@@ -65,6 +66,9 @@ pub enum ExtractError {
     /// There is no place to begin at.
     #[error("{0}")]
     Seeds(String),
+    /// It would have more than is allowed.
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
     /// Another rank has failed, and tells why.
     #[error("another rank could not take it")]
     Elsewhere,

@@ -98,11 +98,7 @@ pub(super) fn pattern(
 }
 
 fn bounds(source: &Source, communicator: &dyn Communicator) -> Bounds {
-    let [lower, upper] = Bounds::around(source.positions.points.iter().copied()).corners();
-    let mut extremes = [-lower[0], -lower[1], -lower[2], upper[0], upper[1], upper[2]];
-    communicator.reduce(Reduction::Maximum, &mut extremes);
-    let [a, b, c, d, e, f] = extremes;
-    Bounds { lower: [-a, -b, -c], upper: [d, e, f] }
+    Bounds::around(source.positions.points.iter().copied()).of_ranks(communicator)
 }
 
 /// A point and the vertices that its values come from.

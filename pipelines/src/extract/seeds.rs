@@ -56,11 +56,12 @@ fn of_features(
 ) -> Result<Vec<Vector>, ExtractError> {
     let communicator = input.communicator;
     let taken = source.surface(input.channel, input.cycle, &|_| false);
-    let surface = match source.whole_mesh().filter(|_| communicator.size() > 1) {
+    let is_flat = communicator.most(source.cells().dimension()) < 3;
+    let surface = match source.whole_mesh() {
         Some(whole) => merged(communicator, whole, taken.as_ref().ok())?,
         None => Some(taken?.extract),
     };
-    let seeds = surface.map(|surface| spread(&surface, features)).transpose();
+    let seeds = surface.map(|surface| spread(&surface, is_flat, features)).transpose();
     let seeds = agree(communicator, seeds).map_err(|error| ExtractError::Seeds(error.message))?;
     let mut message = Writer::default();
     seeds.iter().flatten().for_each(|seed| message.f64s(seed));
@@ -74,8 +75,13 @@ fn of_features(
     Ok(all)
 }
 
-/// Points spread over features of a surface: the middles of the faces at equal steps of the area.
-fn spread(surface: &Extract, features: &SeedFeatures) -> Result<Vec<Vector>, String> {
+/// Points spread over features of a surface: the middles of the faces at equal steps of the area, a
+/// little inside of the mesh, where the mesh is not flat as the surface is.
+fn spread(
+    surface: &Extract,
+    is_flat: bool,
+    features: &SeedFeatures,
+) -> Result<Vec<Vector>, String> {
     let Some(known) = &surface.features else { return Err("the surface has no features".into()) };
     for name in &features.names {
         if !known.names.contains(name) {
@@ -105,8 +111,8 @@ fn spread(surface: &Extract, features: &SeedFeatures) -> Result<Vec<Vector>, Str
             is_due = true;
             let vertices = surface.cells.vertices(face);
             let middle = mean(vertices.iter().map(|&vertex| surface.points[vertex as usize]));
-            let inwards = scale(normal(face), -INSIDE * size.sqrt() / size);
-            seeds.push(add(middle, inwards));
+            let depth = if is_flat { 0.0 } else { INSIDE * size.sqrt() };
+            seeds.push(add(middle, scale(normal(face), -depth / size)));
         }
     }
     if seeds.is_empty() {

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use tombolo_deform::mesh::{CellType, Cells, MeshError};
+use tombolo_deform::mesh::{CellType, Cells, FaceBuffer, MeshError, lowest_four};
 
 use super::{Association, Extract, ExtractFeatures, Field};
 
@@ -31,11 +31,11 @@ pub(super) struct Outside {
 impl Outside {
     /// The outside of the cells that are not hidden.
     pub(super) fn of(cells: &Cells, hidden: Option<Vec<bool>>) -> Self {
-        let mut faces = Faces::default();
+        let (mut faces, mut buffer) = (Faces::default(), FaceBuffer::default());
         for cell in 0..cells.len() {
             let is_hidden = hidden.as_ref().is_some_and(|hidden| hidden[cell]);
-            if cells.cell_type(cell).dimension() == 3 && !is_hidden {
-                cells.for_each_face(cell, |face| faces.push(cell, face));
+            if !is_hidden {
+                buffer.for_each(cells, cell, 3, |_, face| faces.push(cell, face));
             }
         }
         Self { hidden, ..faces.outside() }
@@ -90,7 +90,7 @@ impl Faces {
     pub(super) fn push(&mut self, cell: usize, face: &[u32]) {
         let start = self.corners.len();
         self.corners.extend(face);
-        self.faces.push(Face { key: key(face), cell, start, end: self.corners.len() });
+        self.faces.push(Face { key: lowest_four(face), cell, start, end: self.corners.len() });
     }
 
     /// The faces that occur once.
@@ -116,13 +116,6 @@ struct Face {
     end: usize,
 }
 
-fn key(face: &[u32]) -> [u32; 4] {
-    let mut sorted = face.to_vec();
-    sorted.sort_unstable();
-    sorted.resize(sorted.len().max(4), u32::MAX);
-    [sorted[0], sorted[1], sorted[2], sorted[3]]
-}
-
 fn face_type(face: &[u32]) -> CellType {
     match face.len() {
         3 => CellType::Triangle,
@@ -139,7 +132,7 @@ fn remove_split(outer: &mut Vec<Face>, corners: &[u32]) {
     for face in outer.iter().filter(|face| face.end - face.start == 4) {
         let [a, b, c, d] = [0, 1, 2, 3].map(|corner| corners[face.start + corner]);
         for halves in [[[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]] {
-            let halves = halves.map(|half| key(&half));
+            let halves = halves.map(|half| lowest_four(&half));
             if halves.iter().all(|half| triangles.contains(half)) {
                 inner.extend([face.key, halves[0], halves[1]]);
             }
@@ -189,4 +182,29 @@ fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> (Extract, V
         points: points.iter().map(|&point| extract.points[point]).collect(),
     };
     (taken, points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A hexahedron that has collapsed to a wedge, and a tetrahedron on its lower side.
+    #[test]
+    fn faces_between_collapsed_cells_are_inside() {
+        let mut cells = Cells::new();
+        cells.push(CellType::Hexahedron, &[0, 1, 2, 2, 4, 5, 6, 6]).unwrap();
+        cells.push(CellType::Tetra, &[0, 2, 1, 3]).unwrap();
+        let extract = Extract {
+            points: (0..7).map(|x| [f64::from(x), 0.0, 0.0]).collect(),
+            cells: cells.into(),
+            vertices: None,
+            features: None,
+            fields: Vec::new(),
+        };
+        let skin = skin(&extract).unwrap().unwrap();
+        let mut corners: Vec<usize> = skin.cells.iter().map(|(_, face)| face.len()).collect();
+        corners.sort_unstable();
+        // The upper side and three walls of the wedge, and the other sides of the tetrahedron.
+        assert_eq!(corners, [3, 3, 3, 3, 4, 4, 4]);
+    }
 }

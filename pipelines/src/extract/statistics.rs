@@ -78,8 +78,9 @@ pub fn statistics(
         sum += part_sum;
         scaled_squares += part_squares;
     }
-    let mut extremes = [-least, largest];
-    communicator.reduce(Reduction::Maximum, &mut extremes);
+    let mut range = [[least, largest]];
+    communicator.join_ranges(&mut range);
+    let [[least, largest]] = range;
     let mut sums = [sum, scaled_squares, count, non_finite];
     communicator.reduce(Reduction::Sum, &mut sums);
     let [sum, scaled_squares, count, non_finite] = sums;
@@ -87,8 +88,8 @@ pub fn statistics(
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
     let non_finite = non_finite as u64;
     FieldStatistics {
-        min: or_nan(-extremes[0]),
-        max: or_nan(extremes[1]),
+        min: or_nan(least),
+        max: or_nan(largest),
         mean: or_nan(sum / count * scale),
         l2: or_nan((scaled_squares / count).sqrt() * scale),
         non_finite,

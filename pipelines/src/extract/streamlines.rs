@@ -22,6 +22,7 @@ use super::pattern::{Base, Input, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
 use crate::language::{Direction, ProbeMethod, Streamlines};
+use crate::limits::Limit;
 
 /// The weights of the slopes at each stage; the last are those of the result.
 const STAGES: [&[f64]; 6] = [
@@ -56,6 +57,8 @@ pub(super) struct Settings {
     pub(super) error: f64,
     /// The speed below which a line ends.
     pub(super) least_speed: f64,
+    /// How many points a rank may have of all lines; they end beyond it.
+    pub(super) points: Limit,
 }
 
 /// The cells of a rank and the field in them.
@@ -234,7 +237,8 @@ impl Line {
         settings: &Settings,
         reached: &mut Vec<Reached>,
     ) -> Outcome {
-        loop {
+        // More points are refused, and need not be found first.
+        while settings.points.check(reached.len()).is_ok() {
             let ahead = self.ahead();
             let Some(found) = ground.finder.find(ahead, ground.key) else {
                 return Outcome::Needs(ahead);
@@ -244,6 +248,7 @@ impl Line {
                 return Outcome::Ended;
             }
         }
+        Outcome::Ended
     }
 
     fn write(&self, message: &mut Writer) {
@@ -366,27 +371,28 @@ pub(super) const TIME: &str = "integration_time";
 /// Collective.
 ///
 /// # Errors
-/// [`ExtractError::Distributed`].
+/// [`ExtractError::Distributed`]; [`ExtractError::Exceeded`] on a rank where the lines have more
+/// than `limit` points, and [`ExtractError::Elsewhere`] on the others.
 pub(super) fn pattern(
     source: &Source,
     input: &Input,
     vectors: &[Vector],
     seeds: &[Vector],
     stage: &Streamlines,
+    limit: Limit,
 ) -> Result<(Pattern, Vec<f64>), ExtractError> {
     let communicator = input.communicator;
     let points = &source.positions.points;
-    let [lower, upper] = Bounds::around(points.iter().copied()).corners();
-    let fastest = vectors.iter().map(|vector| length(*vector));
-    let fastest = fastest.filter(|speed| speed.is_finite()).fold(0.0, f64::max);
-    let mut extremes = [-lower[0], -lower[1], -lower[2], upper[0], upper[1], upper[2], fastest];
-    communicator.reduce(Reduction::Maximum, &mut extremes);
-    let across = [0, 1, 2].map(|axis| extremes[axis] + extremes[axis + 3]);
+    let bounds = Bounds::around(points.iter().copied()).of_ranks(communicator);
+    let speeds = vectors.iter().map(|vector| length(*vector));
+    let mut fastest = [speeds.filter(|speed| speed.is_finite()).fold(0.0, f64::max)];
+    communicator.reduce(Reduction::Maximum, &mut fastest);
     let settings = Settings {
-        max_length: stage.max_length.unwrap_or(5.0 * length(across)),
+        max_length: stage.max_length.unwrap_or(5.0 * length(bounds.extent())),
         max_steps: u32::try_from(stage.max_steps).unwrap_or(u32::MAX),
         error: stage.error,
-        least_speed: 1e-12 * extremes[6],
+        least_speed: 1e-12 * fastest[0],
+        points: limit,
     };
     let finder = Finder::new(source, ProbeMethod::Interpolated);
     let field = |found: &Found| {
@@ -410,6 +416,11 @@ pub(super) fn pattern(
     let key = keys(source, input);
     let ground = Ground { finder: &finder, key: &key, field: &field };
     let mut reached = follow(communicator, &ground, seeds, &numbers, &settings)?;
+    let is_bounded = limit.check(reached.len());
+    if !communicator.all(is_bounded.is_ok()) {
+        is_bounded?;
+        return Err(ExtractError::Elsewhere);
+    }
     reached.sort_by_key(|it| (it.line, it.step));
 
     // How many points each line has, over all ranks.
@@ -475,4 +486,54 @@ pub(super) fn pattern(
         origin: Origin::Probe(layout, indices.into()),
     };
     Ok((pattern, times))
+}
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::communicator::Solo;
+    use tombolo_deform::distributed::Part;
+    use tombolo_deform::shapes::box_of_tets;
+
+    use super::*;
+    use crate::extract::Channel;
+    use crate::language::{Seeds, Streamlines};
+    use crate::limits::LINE_POINTS;
+
+    /// Eight lines of a field that turns, of some hundred points each.
+    fn turning(
+        part: &Part,
+        communicator: &dyn Communicator,
+        most: usize,
+    ) -> Result<usize, ExtractError> {
+        let channel = Channel::new("fluid", part.view(), &[]);
+        let mut source = Source::new(&channel)?;
+        let input = Input { channel: &channel, cycle: 0, wanted: &|_| false, communicator };
+        source.update(&input)?;
+        let vectors: Vec<Vector> =
+            part.points.iter().map(|[x, y, _]| [0.5 - y, x - 0.5, 0.0]).collect();
+        let seeds: Vec<Vector> =
+            (0..8).map(|seed| [0.6, 0.5, 0.1 * f64::from(seed) + 0.1]).collect();
+        let stage = Streamlines {
+            field: "u".into(),
+            seeds: Seeds::Points(seeds.clone()),
+            direction: Direction::Forward,
+            max_length: Some(1e3),
+            max_steps: 300,
+            error: 1e-6,
+        };
+        let limit = Limit { most, ..LINE_POINTS };
+        let (pattern, _) = pattern(&source, &input, &vectors, &seeds, &stage, limit)?;
+        Ok(pattern.points.len())
+    }
+
+    #[test]
+    fn lines_of_too_many_points_are_refused() {
+        let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+        let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let all = turning(&whole, &Solo, 1 << 20).unwrap();
+        assert_eq!(all, 8 * 301);
+        assert_eq!(turning(&whole, &Solo, all).unwrap(), all);
+        let error = turning(&whole, &Solo, 1000).unwrap_err();
+        assert_eq!(error.to_string(), "found 1001 points, expected at most 1000");
+    }
 }

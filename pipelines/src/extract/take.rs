@@ -20,6 +20,7 @@ use super::{
 use crate::language::{
     Clip, ClipBy, Contour, Glyphs, GlyphsAt, Probe, Quantifier, Slice, Streamlines, Threshold,
 };
+use crate::limits::LINE_POINTS;
 
 impl Source {
     /// The cut of the mesh with planes, a cylinder or a sphere: polygons that turn
@@ -175,7 +176,8 @@ impl Source {
             return Err(ExtractError::Elsewhere);
         }
         let seeds = seeds::of(self, input, &stage.seeds)?;
-        let (pattern, times) = streamlines::pattern(self, input, &vectors, &seeds, stage)?;
+        let (pattern, times) =
+            streamlines::pattern(self, input, &vectors, &seeds, stage, LINE_POINTS)?;
         let mut extracted = pattern.fill_once(input);
         let extract = Arc::make_mut(&mut extracted.extract);
         extract.fields.retain(|field| field.name != streamlines::TIME);

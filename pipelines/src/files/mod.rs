@@ -46,6 +46,7 @@ mod scanner;
 #[cfg(test)]
 mod tests;
 mod vtk;
+mod whole;
 
 use std::io::Write;
 use std::path::Path;
@@ -61,6 +62,7 @@ pub use error::{FileError, Position, Problem};
 pub use model::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_vtkio};
 pub use pictures::{Database, write_picture};
 pub use vtk::{Compression, Series};
+pub use whole::write_durably;
 
 use crate::extract::{Extract, Field};
 use error::Flaw;
@@ -245,23 +247,5 @@ fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut std::fs::File) -> std::io::Result<()>,
 ) -> Result<(), FileError> {
-    let attempt = || -> std::io::Result<()> {
-        let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-        if let Some(directory) = directory {
-            std::fs::create_dir_all(directory)?;
-        }
-        let mut name = std::ffi::OsString::from(".");
-        name.push(path.file_name().unwrap_or_default());
-        name.push(format!(".{}.part", std::process::id()));
-        let beside = path.with_file_name(name);
-        let written = std::fs::File::create(&beside)
-            .and_then(|mut file| write(&mut file))
-            .and_then(|()| std::fs::rename(&beside, path));
-        if written.is_err() {
-            // The error that matters is the first; this only tidies up.
-            let _ = std::fs::remove_file(&beside);
-        }
-        written
-    };
-    attempt().map_err(|error| Flaw::from(error).in_file(path))
+    whole::write_whole(path, write).map_err(|error| Flaw::from(error).in_file(path))
 }

@@ -1,10 +1,10 @@
 //! Pictures as PNG files, and Cinema databases of them.
 
-use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::error::{FileError, Flaw};
+use super::whole::write_longer;
 use super::write_atomically;
 use crate::render::{Image, Picture};
 
@@ -78,14 +78,8 @@ impl Database {
             angles.map_or([String::new(), String::new()], |them| them.map(|it| it.to_string()));
         let row = format!("{time},{cycle},{camera},{azimuth},{elevation},{name}\n");
         let table = self.folder.join(TABLE);
-        let old = File::open(&table).map_err(|error| Flaw::from(error).in_file(&table))?;
-        write_atomically(&table, |new| {
-            let copied = std::io::copy(&mut old.take(self.length), new)?;
-            if copied < self.length {
-                return Err(std::io::Error::other("the table was cut short by another program"));
-            }
-            new.write_all(row.as_bytes())
-        })?;
+        write_longer(&table, self.length, &row, "")
+            .map_err(|error| Flaw::from(error).in_file(&table))?;
         self.length += row.len() as u64;
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Errors that point at their token.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use serde_path_to_error::Segment;
@@ -201,6 +202,15 @@ pub(super) fn finite(value: f64) -> Result<(), Problem> {
         Ok(())
     } else {
         Err(Problem::new(format!("found {value}, expected a finite number")))
+    }
+}
+
+/// Refuses a list in which a name stands twice; `what` are those that are named.
+pub(super) fn none_twice(names: &[String], what: &str) -> Result<(), Problem> {
+    let mut before = HashSet::new();
+    match names.iter().position(|name| !before.insert(name)) {
+        Some(index) => Err(Problem::new(format!("found the same {what} twice")).at(index)),
+        None => Ok(()),
     }
 }
 

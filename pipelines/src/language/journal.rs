@@ -2,6 +2,7 @@
 //! handed.
 
 use std::collections::HashMap;
+use std::num::NonZeroU64;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -114,6 +115,10 @@ pub struct ViewerNote {
     pub may_drive: bool,
     /// The action.
     pub did: ViewerMove,
+    /// How many lines about viewers with the same rights were left out before this one, because there
+    /// were too many.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<NonZeroU64>,
 }
 
 /// An action of a viewer.
@@ -184,9 +189,9 @@ pub struct Recording {
 /// Reads a journal as a recording of its newest run.
 ///
 /// Orders that were rejected, cancelled or still waiting when the run ended are not in it. A run that
-/// goes on from a checkpoint of an earlier one begins with the lines of that one up to there. A last
-/// line that a killed run left half-written is passed over. Files that edits name lie beside `file`
-/// where they are relative.
+/// goes on from a checkpoint of an earlier one begins with the lines of that one up to there, but for
+/// its pauses and stops. A last line that a killed run left half-written is passed over. Files that
+/// edits name lie beside `file` where they are relative.
 ///
 /// # Errors
 /// A [`LanguageError`] at the first line that is wrong.
@@ -221,7 +226,7 @@ pub(super) fn parse_lines(text: &str, file: &str) -> Result<Vec<TimedCommand>, L
     let mut commands: Vec<Known> =
         known.filter(|known| known.is_carried_out && !is_given_again(known)).collect();
     commands.sort_by_key(|known| known.took_effect);
-    Ok(commands.into_iter().map(|known| known.timed).collect())
+    Ok(commands.into_iter().map(Known::alone).collect())
 }
 
 /// A command of a journal.
@@ -231,6 +236,24 @@ struct Known {
     /// The number of the line that says when it took effect.
     took_effect: usize,
     is_carried_out: bool,
+    /// Whether it stands in lines of a journal.
+    is_entry: bool,
+}
+
+impl Known {
+    /// The command as one of a file of orders.
+    fn alone(mut self) -> TimedCommand {
+        if let (true, Command::Order(order)) = (self.is_entry, &mut self.timed.command) {
+            // The order whose place it took is not among those that were carried out.
+            order.replaces = None;
+        }
+        self.timed
+    }
+
+    /// Whether it was for the job that it was given in, and not for one that goes on from there.
+    fn is_of_job(&self) -> bool {
+        matches!(self.timed.command, Command::Pause {} | Command::Resume {} | Command::Stop {})
+    }
 }
 
 /// The lines of the newest run.
@@ -284,6 +307,8 @@ fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
                     newest.add(&Document::read(content, file).map_err(at_line(number))?, number)?;
                     newest.lines.push((number, content));
                 }
+                let of_job = newest.known.commands.iter_mut().filter(|known| known.is_of_job());
+                of_job.for_each(|known| known.is_carried_out = false);
             }
         }
         newest.add(&line, number)?;
@@ -340,8 +365,13 @@ impl RunLines<'_> {
             .map_err(|exceeded| moved(line.locate(exceeded.into())))?;
         if !is_entry(line) {
             let timed = line.valid().map_err(moved)?;
-            let known_of = Known { timed, by: None, took_effect: number, is_carried_out: true };
-            known.commands.push(known_of);
+            known.commands.push(Known {
+                timed,
+                by: None,
+                took_effect: number,
+                is_carried_out: true,
+                is_entry: false,
+            });
             return Ok(());
         }
         let entry: JournalEntry = line.valid().map_err(moved)?;
@@ -358,6 +388,7 @@ impl RunLines<'_> {
                     by: entry.by,
                     took_effect: number,
                     is_carried_out,
+                    is_entry: true,
                 });
             }
             (OrderStatus::Applied, _, Some(index)) => {
@@ -502,6 +533,71 @@ mod tests {
         let alone = [header("r2", &restart("r1", "k1")), entry("b", 5)].join("\n");
         let error = parse_journal(&alone, "journal.jsonl").unwrap_err();
         assert!(error.message.contains("run r1") && error.path == "run.restart", "{error}");
+    }
+
+    #[test]
+    fn a_restarted_run_is_not_stopped_where_the_one_before_was() {
+        let header = |id: &str, restart: &str| {
+            format!(
+                r#"{{"run":{{"id":"{id}","version":"0","began":0,"deform":{{}},"guard":{{}},"schedule":{{"steps":1}}{restart}}}}}"#
+            )
+        };
+        let applied = |id: &str, command: &str, cycle: u64| {
+            format!(
+                r#"{{"id":"{id}","status":"accepted","cycle":{cycle},"time":0,"{command}":{{}},"by":"program"}}
+{{"id":"{id}","status":"applied","cycle":{cycle},"time":0}}"#
+            )
+        };
+        let heating = r#"{"id":"p","status":"accepted","cycle":1,"time":0,"parameter":{"name":"heating","value":1}}
+{"id":"p","status":"applied","cycle":1,"time":0}"#;
+        let first = [
+            header("r1", ""),
+            heating.to_owned(),
+            applied("pause", "pause", 2),
+            applied("resume", "resume", 2),
+            applied("pause again", "pause", 3),
+            applied("stop", "stop", 3),
+        ];
+        let second = [
+            r#"{"checkpoint":{"id":"k1","cycle":3,"time":0}}"#.to_owned(),
+            r#"{"end":{"cycle":3,"time":0}}"#.to_owned(),
+            header("r2", r#","restart":{"run":"r1","checkpoint":"k1","cycle":3}"#),
+            applied("own stop", "stop", 8),
+        ];
+        let ids = |commands: Vec<TimedCommand>| -> Vec<String> {
+            commands.into_iter().filter_map(|timed| timed.id).collect()
+        };
+        let [first, both] = [first.join("\n"), [&first[..], &second[..]].concat().join("\n")];
+        for (text, expected) in [
+            (&first, &["p", "pause", "resume", "pause again", "stop"][..]),
+            (&both, &["p", "own stop"][..]),
+        ] {
+            assert_eq!(ids(parse_journal(text, "journal.jsonl").unwrap().commands), expected);
+            assert_eq!(ids(super::super::parse_orders(text, "journal.jsonl").unwrap()), expected);
+        }
+    }
+
+    #[test]
+    fn an_order_that_has_replaced_another_replaces_none_in_a_file_of_orders() {
+        let journal = r#"{"id":"a","status":"accepted","cycle":3,"time":0.3,"order":{"undo":1}}
+{"id":"b","status":"accepted","cycle":4,"time":0.4,"order":{"undo":2,"replaces":"a"}}
+{"id":"a","status":"rejected","cycle":5,"time":0.5,"reason":"replaced by order b"}
+{"id":"b","status":"applied","cycle":5,"time":0.5}
+{"at":{"cycle":9},"id":"c","order":{"undo":1,"replaces":"d"}}
+"#;
+        let replaces = |commands: Vec<TimedCommand>| -> Vec<Option<String>> {
+            let replaces = |timed: TimedCommand| match timed.command {
+                Command::Order(order) => order.replaces,
+                _ => None,
+            };
+            commands.into_iter().map(replaces).collect()
+        };
+        let (a, d) = (Some("a".to_owned()), Some("d".to_owned()));
+        let orders = super::super::parse_orders(journal, "journal.jsonl").unwrap();
+        assert_eq!(replaces(orders), [None, d.clone()]);
+        // A run that is carried out again says what the first one said.
+        let recording = parse_journal(journal, "journal.jsonl").unwrap();
+        assert_eq!(replaces(recording.commands), [a, d]);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
 use super::{Csv, Log, Parameter, Problem, Problems, nearest};
-use crate::expression::Expression;
+use crate::expression::{Expression, UsedName};
 
 /// A number that a pipeline measures.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -234,16 +234,10 @@ impl Condition {
             vec![Problem::new(message).suggest(error.suggestion.as_deref())]
         })?;
         let (mut slots, mut problems) = (Vec::new(), Vec::new());
-        for name in &names {
+        for UsedName { name, column } in &names {
             match scope.find(name) {
                 Ok(slot) => slots.push(slot),
                 Err(problem) => {
-                    // Where it stands a parser knows that knows all the others.
-                    let others: Vec<&str> =
-                        names.iter().map(String::as_str).filter(|it| it != name).collect();
-                    let column = Expression::parse_condition(text, &others)
-                        .err()
-                        .map_or(1, |error| error.column);
                     problems.push(problem.after(&format!("column {column} of the formula: ")));
                 }
             }

@@ -11,7 +11,9 @@ use crate::limits::WAITING_BYTES;
 /// journal.
 ///
 /// From a journal come the commands of its newest run that took effect, each at the cycle at which
-/// it did; those of pipelines do not, because a run with the same pipelines gives them again. A last
+/// it did; those of pipelines do not, because a run with the same pipelines gives them again. Of a
+/// run that was restarted, pauses and stops before the checkpoint do not either. An order that took
+/// the place of another (`replaces`) comes without the name of that one, which is not there. A last
 /// line that a killed run left half-written is passed over. Where runs are to be the same to the
 /// bit, read a journal with [`parse_journal`](super::parse_journal).
 ///

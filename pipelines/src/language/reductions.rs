@@ -9,7 +9,7 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::schedule::Interval;
 
 use super::derived::check_name;
-use super::error::finite;
+use super::error::{finite, none_twice};
 use super::extracts::check_point;
 use super::{Problem, nearest};
 use crate::limits::{BINS, HISTORY};
@@ -467,13 +467,7 @@ fn check_features(features: &[String], is_after_surface: bool) -> Result<(), Pro
         let message = "found features, which are those of a `surface` stage before it";
         return Err(Problem::new(message).within("features"));
     }
-    for (index, name) in features.iter().enumerate() {
-        if features[..index].contains(name) {
-            let problem = Problem::new("found the same feature twice");
-            return Err(problem.at(index).within("features"));
-        }
-    }
-    Ok(())
+    none_twice(features, "feature").map_err(|problem| problem.within("features"))
 }
 
 /// Fewer triangles for viewers and files that come after it: of a surface, or of the outside of

@@ -56,7 +56,8 @@ pub enum Stage {
     /// Leaves only some fields.
     Select(Select),
     /// Measures the cells: monitors `quality.min`, `quality.mean`, `quality.max` and
-    /// `quality.inverted`, and the element field `scaled_jacobian`.
+    /// `quality.inverted`, and the element field `scaled_jacobian`, where the solver has none of that
+    /// name.
     Quality {},
     /// Measures a field: monitors `<field>.min`, `.max`, `.mean`, `.l2` (of the magnitude, for a
     /// vector) and `.non_finite`.

@@ -14,7 +14,8 @@ use crate::limits::{SEEDS, STEPS};
 ///
 /// Integrated by the method of Dormand and Prince, of order 5, whose step is halved and doubled as
 /// its estimate of the error says. A line ends at the boundary (to a thousandth of a cell), where
-/// the field is 0, and by `max_length` and `max_steps`.
+/// the field is 0, and by `max_length` and `max_steps`. Lines that have more than two million points
+/// in the part of a rank are refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "StreamlinesKeys", into = "StreamlinesKeys")]
 pub struct Streamlines {

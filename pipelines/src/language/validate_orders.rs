@@ -1,12 +1,14 @@
 //! The rules that edits, orders and other commands must keep to.
 
+use std::collections::HashSet;
+
 use tombolo_deform::edit::Edit;
 use tombolo_deform::number::Number;
 use tombolo_deform::quality::Guard;
 use tombolo_deform::schedule::Schedule;
 use tombolo_deform::shape::check_stack;
 
-use super::error::finite;
+use super::error::{finite, none_twice};
 use super::order::{Change, Command, Order, Question};
 use super::parse::Validate;
 use super::pipeline::At;
@@ -64,18 +66,15 @@ fn check_edits(edits: &[Edit]) -> Found {
 pub(super) fn check_deformation(stage: &Deformation) -> Result<(), Problem> {
     stage.equation.validate().map_err(|error| Problem::new(error.to_string()))?;
     for (key, names) in [("sliding", &stage.sliding), ("free", &stage.free)] {
-        for (index, name) in names.iter().enumerate() {
-            if names[..index].contains(name) {
-                return Err(Problem::new("found the same feature twice").at(index).within(key));
-            }
-        }
+        none_twice(names, "feature").map_err(|problem| problem.within(key))?;
     }
     if stage.surface_only && stage.lets_go() {
         let key = if stage.free.is_empty() { "sliding" } else { "free" };
         let message = "found features although `method` is `surface`: no volume is moved that they could follow";
         return Err(Problem::new(message).within(key));
     }
-    match stage.free.iter().position(|name| stage.sliding.contains(name)) {
+    let sliding: HashSet<&String> = stage.sliding.iter().collect();
+    match stage.free.iter().position(|name| sliding.contains(name)) {
         Some(index) => {
             let message = format!("found `{}`, which is among `sliding` too", stage.free[index]);
             Err(Problem::new(message).at(index).within("free"))

@@ -104,12 +104,12 @@ fn range(stage: &Histogram, region: &Region, entries: &[(f64, f64)]) -> [f64; 2]
     if let Some(range) = stage.range {
         return range;
     }
-    let mut extremes = [f64::NEG_INFINITY; 2];
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for &(value, _) in entries {
-        extremes = [extremes[0].max(-value), extremes[1].max(value)];
+        range = [range[0].min(value), range[1].max(value)];
     }
-    region.communicator.reduce(Reduction::Maximum, &mut extremes);
-    let [lower, upper] = [-extremes[0], extremes[1]];
+    region.communicator.join_ranges(std::slice::from_mut(&mut range));
+    let [lower, upper] = range;
     if lower <= upper { [lower, upper] } else { [f64::NAN; 2] }
 }
 

@@ -84,10 +84,9 @@ impl Samples {
         transform(&mut parts);
         let size = |part: usize| parts[part][0].hypot(parts[part][1]);
         let squares: f64 = (0..count).map(|index| window(index).powi(2)).sum();
-        let density = |part: usize| {
-            let sides = if part == 0 || part == count / 2 { 1.0 } else { 2.0 };
-            sides * size(part).powi(2) * step / squares
-        };
+        // The first and the last part are their own mirror images.
+        let sides = |part: usize| if part == 0 || part == count / 2 { 1.0 } else { 2.0 };
+        let density = |part: usize| sides(part) * size(part).powi(2) * step / squares;
         let resolution = 1.0 / (number * step);
         let strongest = (1..=count / 2).fold(1, |a, b| if size(b) > size(a) { b } else { a });
         let shift = if strongest < count / 2 {
@@ -103,7 +102,7 @@ impl Samples {
         let mut values = vec![
             (at(strongest) + shift) * resolution,
             resolution,
-            4.0 / number * size(strongest) / left,
+            sides(strongest) * 2.0 / number * size(strongest) / left,
         ];
         values.extend((0..=count / 2).map(density));
         (values, is_uneven)

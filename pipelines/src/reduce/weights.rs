@@ -33,14 +33,6 @@ impl Weights {
         let vertices = cells.vertices(cell);
         let at = |vertex: u32| points[vertex as usize];
         match (cells.cell_type(cell), vertices) {
-            (CellType::Pixel, &[a, b, c, d]) => self.polygon(&[a, b, d, c], at),
-            (CellType::TriangleStrip, _) => {
-                for (index, triangle) in vertices.windows(3).enumerate() {
-                    // Every other triangle of a strip is turned the other way.
-                    let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
-                    self.polygon(&if index % 2 == 0 { [a, b, c] } else { [b, a, c] }, at);
-                }
-            }
             (CellType::Tetra, &[a, b, c, d]) => {
                 let size = volume([a, b, c, d].map(at));
                 self.parts.extend(vertices.iter().map(|&vertex| (vertex, size / 4.0, [0.0; 3])));
@@ -52,7 +44,7 @@ impl Weights {
                         self.parts.extend(pair.iter().map(|&vertex| (vertex, half, [0.0; 3])));
                     }
                 }
-                2 => self.polygon(vertices, at),
+                2 => cells.for_each_polygon(cell, |polygon| self.polygon(polygon, at)),
                 3 => self.volume(cells, cell, at),
                 _ => {}
             },

@@ -1,7 +1,7 @@
 //! What is drawn: faces, lines and points on a lattice, with their values.
 
 use tombolo_deform::bounds::Bounds;
-use tombolo_deform::communicator::{Communicator, Reduction};
+use tombolo_deform::communicator::Communicator;
 use tombolo_deform::mesh::CellType;
 
 use super::lattice::{Lattice, rounded};
@@ -74,20 +74,10 @@ impl Scene {
                         scene.of_lines.push(value);
                     }
                 }
-                CellType::Pixel => {
-                    scene.push([0, 1, 3, 2].map(|at| vertices[at]), value);
-                }
-                CellType::TriangleStrip => {
-                    for (index, corners) in vertices.windows(3).enumerate() {
-                        let turned = if index % 2 == 0 { [0, 1, 2] } else { [1, 0, 2] };
-                        scene.push(turned.map(|at| corners[at]), value);
-                    }
-                }
-                CellType::Triangle | CellType::Quad | CellType::Polygon => {
-                    scene.push(vertices.iter().copied(), value);
-                }
                 // Those of volumes are not shown: their faces are.
-                _ => {}
+                _ => extract.cells.for_each_polygon(cell, |polygon| {
+                    scene.push(polygon.iter().copied(), value);
+                }),
             }
         }
         scene
@@ -109,15 +99,8 @@ impl Scene {
 /// The box around what all ranks show; `None` where there is nothing. Collective.
 pub(super) fn bounds(communicator: &dyn Communicator, shown: &Shown) -> Option<Bounds> {
     let own = Bounds::around(shown.extract.points.iter().copied());
-    let [lower, upper] = own.corners();
-    let mut extremes = [0.0; 6];
-    for axis in 0..3 {
-        (extremes[axis], extremes[axis + 3]) = (-lower[axis], upper[axis]);
-    }
-    communicator.reduce(Reduction::Maximum, &mut extremes);
-    let lower = [0, 1, 2].map(|axis| -extremes[axis]);
-    let upper = [3, 4, 5].map(|axis| extremes[axis]);
-    lower.iter().chain(&upper).all(|x| x.is_finite()).then_some(Bounds { lower, upper })
+    let all = own.of_ranks(communicator);
+    all.corners().as_flattened().iter().all(|x| x.is_finite()).then_some(all)
 }
 
 /// The values that colour, one for each point or cell.
@@ -161,12 +144,12 @@ impl Values {
         communicator: &dyn Communicator,
         values: Option<&Self>,
     ) -> Option<[f64; 2]> {
-        let mut extremes = [f64::NEG_INFINITY; 2];
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
         for &value in values.iter().flat_map(|it| &it.values).filter(|value| value.is_finite()) {
-            extremes = [extremes[0].max(-value), extremes[1].max(value)];
+            range = [range[0].min(value), range[1].max(value)];
         }
-        communicator.reduce(Reduction::Maximum, &mut extremes);
-        let [least, largest] = [-extremes[0], extremes[1]];
+        communicator.join_ranges(std::slice::from_mut(&mut range));
+        let [least, largest] = range;
         (least.is_finite() && largest.is_finite()).then_some([least, largest])
     }
 

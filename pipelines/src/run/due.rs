@@ -16,6 +16,8 @@ pub(super) struct Now {
     pub(super) seconds: f64,
     /// How many viewers have come so far.
     pub(super) viewers: u64,
+    /// The last cycle at which pipelines could run, where they cannot at every step.
+    pub(super) met: Option<u64>,
 }
 
 /// When a pipeline runs, and when it last did.
@@ -38,7 +40,10 @@ impl Clock {
             return false;
         }
         match self.due {
-            Due::Every(Cadence::Steps(steps)) => now.cycle % steps == 0,
+            Due::Every(Cadence::Steps(steps)) => {
+                // A multiple that went by where it could not run is made up for.
+                now.cycle % steps == 0 || now.met.is_some_and(|met| now.cycle / steps > met / steps)
+            }
             Due::Every(cadence) => {
                 let interval = interval(cadence, now);
                 self.last_interval.is_none_or(|last| interval > last)
@@ -101,7 +106,7 @@ mod tests {
         for cycle in 0..steps {
             // Each step takes 0.3 seconds, and viewers come before the fifth and the sixth.
             let seconds = 0.3 * cycle as f64;
-            let now = Now { cycle, time, seconds, viewers: cycle.clamp(3, 5) - 3 };
+            let now = Now { cycle, time, seconds, viewers: cycle.clamp(3, 5) - 3, met: None };
             if clock.is_due(&now) {
                 clock.take(&now);
                 taken.push(cycle);
@@ -125,5 +130,27 @@ mod tests {
         assert_eq!(cycles(Due::OnViewer, 0.1, 10), [4, 5]);
         assert_eq!(cycles(Due::OnOrder, 0.1, 10), [0; 0]);
         assert_eq!(cycles(Due::OnEnd, 0.1, 10), [0; 0]);
+    }
+
+    #[test]
+    fn steps_that_went_by_are_made_up_for() {
+        let due = Due::Every(Cadence::Steps(5.try_into().unwrap()));
+        // The cycles at which it runs, where it can at each third from some cycle on.
+        let taken = |first: u64| -> Vec<u64> {
+            let (mut clock, mut met) = (Clock::new(due), None);
+            let of_meetings = (first..30).step_by(3);
+            let run = of_meetings.filter(|&cycle| {
+                let now = Now { cycle, met, ..Now::default() };
+                let is_due = clock.is_due(&now);
+                if is_due {
+                    clock.take(&now);
+                }
+                met = Some(cycle);
+                is_due
+            });
+            run.collect()
+        };
+        assert_eq!(taken(0), [0, 6, 12, 15, 21, 27]);
+        assert_eq!(taken(1), [7, 10, 16, 22, 25]);
     }
 }

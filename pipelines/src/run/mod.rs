@@ -111,6 +111,13 @@ impl Runner {
         (self.outside.seconds, self.outside.viewers) = (seconds, viewers);
     }
 
+    /// Says that pipelines could run last at this cycle, for ranks that do not come together at
+    /// every step: those of every so many steps make up for a multiple that went by since. All
+    /// ranks say the same.
+    pub fn set_met(&mut self, cycle: u64) {
+        self.outside.met = Some(cycle);
+    }
+
     /// Whether any pipeline waits for what [`tell`](Self::tell) tells.
     #[must_use]
     pub fn listens(&self) -> bool {

@@ -131,7 +131,10 @@ impl Runner {
         let name = pipeline.channel.as_deref();
         let found = source(&mut self.sources, snapshot.channels, name, &self.communicator);
         let tried = match found {
-            Ok((channel, source)) => trial.try_out(snapshot, channel, source, &*self.communicator),
+            Ok((channel, source)) => {
+                let parameters = &self.board.parameters;
+                trial.try_out(snapshot, channel, source, &*self.communicator, parameters)
+            }
             Err(message) => Err(message),
         };
         tried.map_err(|message| ReplaceError::Mesh { pipeline: pipeline.name.clone(), message })

@@ -29,6 +29,10 @@ fn number(components: &[Array<'_>]) -> NumberType {
 
 /// Components as they lie in the solver's memory, where each can be lent.
 pub(super) fn lent<'call>(components: &[Array<'call>]) -> Option<ArrayView<'call>> {
+    // Vectors as most solvers have them: looked at as one list, they are read several times as fast.
+    if let Some((values, _)) = Array::interleaved(components).and_then(|all| all.values()) {
+        return ArrayView::interleaved(values, components.len()).ok();
+    }
     let mut columns: [(Values<'call>, usize, usize); COMPONENTS] =
         [(Values::U8(&[]), 0, 1); COMPONENTS];
     for (column, array) in columns.iter_mut().zip(components) {
@@ -49,5 +53,39 @@ impl<'call> Field<'call> {
     #[must_use]
     pub fn of_ghosts(self) -> Self {
         Self { name: GHOST_FIELD.to_owned(), number: NumberType::U8, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tuples_without_a_gap_are_lent_as_one_list() {
+        let numbers: Vec<f64> = (0..12).map(f64::from).collect();
+        let component = |first: usize, count: usize, stride: usize| {
+            let stride = stride * size_of::<f64>();
+            let address = numbers[first..].as_ptr().cast();
+            // SAFETY: the numbers live to the end of the test, and so many follow the first of these.
+            unsafe { Array::new(address, count, stride, NumberType::F64, false) }
+        };
+        let tuples = [0, 1, 2].map(|first| component(first, 4, 3));
+        let seen = lent(&tuples).expect("numbers that can be lent");
+        assert_eq!((seen.len(), seen.components()), (4, 3));
+        assert_eq!(seen.contiguous(), Some(numbers.as_slice()));
+        for others in [
+            [1, 0, 2].map(|first| component(first, 4, 3)),
+            [0, 1, 2].map(|first| component(first, 3, 4)),
+            [0, 4, 8].map(|first| component(first, 4, 1)),
+        ] {
+            let seen = lent(&others).expect("numbers that can be lent");
+            assert_eq!(seen.contiguous(), None);
+            for (component, array) in others.iter().enumerate() {
+                assert_eq!(seen.len(), array.len());
+                assert!(
+                    (0..seen.len()).all(|tuple| seen.get(tuple, component) == array.get(tuple))
+                );
+            }
+        }
     }
 }

@@ -67,14 +67,21 @@ impl Steerer {
     }
 
     /// Notes that the run ends: orders whose turn has not come change nothing, and no call will show
-    /// whether the solver went to the last shape that it was handed.
-    pub(crate) fn end(&mut self, moment: Moment) {
+    /// whether the solver went to the last shape that it was handed. With `is_saved` a checkpoint
+    /// holds these orders, for a run that goes on from there.
+    pub(crate) fn end(&mut self, moment: Moment, is_saved: bool) {
+        let end = |id: &str, reason: &str| {
+            if is_saved {
+                self.log.leave_open(id);
+            } else {
+                self.log.reject(id, moment, &reason.into());
+            }
+        };
         if let Some(computing) = self.computing.take() {
-            let reason = "it was given up: the run ended before its shapes were known";
-            self.log.reject(&computing.id, moment, &reason.into());
+            end(&computing.id, "it was given up: the run ended before its shapes were known");
         }
         for task in std::mem::take(&mut self.waiting) {
-            self.log.reject(&task.id, moment, &"the run ended before its turn came".into());
+            end(&task.id, "the run ended before its turn came");
         }
         if let Some(Pending { id, shape, moment, .. }) = self.pending.take() {
             self.log.not_confirmed(&id, moment, shape);

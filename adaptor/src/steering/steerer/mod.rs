@@ -80,7 +80,9 @@ pub(crate) struct Steerer {
     motion: Option<Motion>,
     /// The motion that was handed out last.
     handed_out: MeshMotion,
+    // Both here too, because the planner is locked as long as its thread is at work.
     domain: Domain,
+    surface: Option<Arc<Surface>>,
     /// The coordinates that all shapes are measured from.
     reference: Arc<[Vector]>,
     rounding: Rounding,
@@ -153,6 +155,7 @@ impl Steerer {
         let reference = Arc::clone(shaper.reference());
         let here: CurrentShape = Arc::clone(&reference).into();
         let domain = shaper.domain().clone();
+        let surface = shaper.surface().cloned();
         let boundary = shaper.boundary_vertices().into();
         let rounding = Rounding::of(shaper.reference(), domain.communicator());
         let planner = Arc::new(Mutex::new(Planner::new(shaper)));
@@ -166,6 +169,7 @@ impl Steerer {
         let present = Arc::new(Mutex::new(present));
         Self {
             domain,
+            surface,
             reference,
             rounding,
             pending: None,
@@ -222,12 +226,12 @@ impl Steerer {
 
     /// The surface of the mesh, where this process has it.
     pub(crate) fn surface(&self) -> Option<Arc<Surface>> {
-        lock(&self.planner).shaper().surface().cloned()
+        self.surface.clone()
     }
 
     /// The reference mesh, or this rank's part of it, which shares its arrays.
     pub(crate) fn mesh(&self) -> Mesh {
-        lock(&self.planner).shaper().mesh().clone()
+        self.domain.mesh().clone()
     }
 
     /// A forecaster for other threads; `None` where the worker has ended.
@@ -531,5 +535,40 @@ impl Steerer {
             taken: 0.0,
             reached: 0.0,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
+
+    use super::*;
+    use crate::journal::Journal;
+
+    /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
+    #[test]
+    fn what_stays_the_same_is_told_while_the_planner_is_at_work() {
+        let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+        let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
+        let log = Arc::new(Log::new(Journal::none(), None));
+        let steerer =
+            Steerer::new(shaper, Defaults::default(), log, Arc::default(), false).unwrap();
+        let planner = Arc::clone(&steerer.planner);
+        let (begins, begun) = channel();
+        let (ends, ended) = channel::<()>();
+        let at_work = std::thread::spawn(move || {
+            let _planner = lock(&planner);
+            begins.send(()).unwrap();
+            let _ = ended.recv_timeout(Duration::from_secs(10));
+        });
+        begun.recv().unwrap();
+        assert!(steerer.surface().is_some_and(|told| Arc::ptr_eq(&told, &surface)));
+        assert_eq!(steerer.mesh(), mesh);
+        assert!(steerer.planner.try_lock().is_err(), "it was waited for");
+        drop(ends);
+        at_work.join().unwrap();
     }
 }

@@ -92,26 +92,30 @@ async fn keep(
     };
     let mut ping = tokio::time::interval(PING_PERIOD);
     let mut message = text(&attached);
-    loop {
-        if let Some(message) = message.take()
-            && socket.send(message).await.is_err()
-        {
-            return Ok(());
+    let kept = async {
+        loop {
+            if let Some(message) = message.take()
+                && socket.send(message).await.is_err()
+            {
+                return;
+            }
+            message = tokio::select! {
+                Some(open) = asked.recv() => text(&open),
+                _ = ping.tick() => Some(Message::Ping(Default::default())),
+                said = socket.recv() => match said {
+                    Some(Ok(Message::Ping(_) | Message::Pong(_))) => None,
+                    // It has nothing more to say.
+                    _ => return,
+                },
+            };
         }
-        message = tokio::select! {
-            open = asked.recv() => match open {
-                Some(open) => text(&open),
-                // It has come back by another connection.
-                None => return Ok(()),
-            },
-            _ = ping.tick() => Some(Message::Ping(Default::default())),
-            said = socket.recv() => match said {
-                Some(Ok(Message::Ping(_) | Message::Pong(_))) => None,
-                // It has nothing more to say.
-                _ => return Ok(()),
-            },
-        };
+    };
+    tokio::select! {
+        () = kept => {}
+        // Also where what it was sent is not read.
+        () = run.run.replaced() => {}
     }
+    Ok(())
 }
 
 fn text(message: &impl serde::Serialize) -> Option<Message> {

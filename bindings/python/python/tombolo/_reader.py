@@ -8,11 +8,11 @@ import time as clock
 import weakref
 from collections import deque
 from collections.abc import Callable
-from typing import Optional, TypeVar
+from typing import Any, Optional, TypeVar
 
 from . import _json, _native
 from ._waiting import moment_after
-from .errors import CallError, EndedError, TomboloError, WaitError
+from .errors import CallError, EndedError, FailedError, TomboloError, WaitError
 from .events import Event
 from .state import State
 
@@ -30,7 +30,7 @@ class Reader:
     Parameters
     ----------
     client : _native.Client
-        The client, which nobody else holds: its connection is closed when it is let go.
+        The client.
     state : State
         What is known of the run.
 
@@ -57,24 +57,26 @@ class Reader:
         self._thread.start()
 
     def _read(self, client: _native.Client) -> None:
-        while not self.closed:
-            try:
+        try:
+            while not self.closed:
                 told = client.next(_SLICE)
-            except TomboloError as error:
-                with self.changed:
-                    self.failure = error
-                    self._tell(Event("ended", str(error)))
-                    self.changed.notify_all()
-                return
-            if told is None:
-                continue
-            kind, payload = told
-            data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
+                if told is not None:
+                    self._take(*told)
+        except Exception as error:
+            # Whatever it is, nothing comes any more, and nobody may wait for it.
+            failure = error if isinstance(error, TomboloError) else FailedError(f"what the run told: {error!r}")
             with self.changed:
-                event = self._state.take(kind, data)
-                if event is not None:
-                    self._tell(event)
+                self.failure = failure
+                self._tell(Event("ended", str(failure)))
                 self.changed.notify_all()
+
+    def _take(self, kind: str, payload: Any) -> None:
+        data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
+        with self.changed:
+            event = self._state.take(kind, data)
+            if event is not None:
+                self._tell(event)
+            self.changed.notify_all()
 
     def _tell(self, event: Event) -> None:
         self._listeners = [listener for listener in self._listeners if listener() is not None]
@@ -121,8 +123,10 @@ class Reader:
             self.changed.notify_all()
         if threading.current_thread() is not self._thread:
             self._thread.join(5.0)
-        # Whoever still has the run must not keep the wheel by it.
-        self._missed, self._client = self.missed, None
+        client, self._missed, self._client = self._client, self.missed, None
+        if client is not None:
+            # Letting go of it would not do: the traceback of an error may hold it, and the wheel with it.
+            client.close()
 
     # ---- Waiting.
 

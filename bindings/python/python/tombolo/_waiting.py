@@ -15,10 +15,22 @@ def moment_after(timeout: Optional[float]) -> float:
     return float("inf") if timeout is None else time.monotonic() + timeout
 
 
-def in_thread(call: Callable[[], Result]) -> Result:
+def in_thread(
+    call: Callable[[], Result],
+    progress: Optional[Callable[[float], object]] = None,
+    cancel: Optional[Callable[[], object]] = None,
+) -> Result:
     """What a call of Rust's returns that may take long: on a thread of its own, so that this one can be interrupted.
 
-    A call that is interrupted goes on by itself, and what it returns is dropped.
+    Parameters
+    ----------
+    call : callable
+        The call.
+    progress : callable, optional
+        Called at once and then about ten times a second, with the seconds so far. What it raises is an interruption.
+    cancel : callable, optional
+        Has a call that was interrupted given up, which is waited for. Left out, it goes on by itself, and what it
+        returns is dropped.
     """
     done = threading.Event()
     results: list[Result] = []
@@ -32,9 +44,19 @@ def in_thread(call: Callable[[], Result]) -> Result:
         finally:
             done.set()
 
+    begun = time.monotonic()
     threading.Thread(target=work, name="tombolo-call", daemon=True).start()
-    while not done.wait(1.0):
-        pass
+    try:
+        while True:
+            if progress is not None:
+                progress(time.monotonic() - begun)
+            if done.wait(1.0 if progress is None else 0.1):
+                break
+    except BaseException:
+        if cancel is not None:
+            cancel()
+            done.wait()
+        raise
     if errors:
         # An error in a list of its own traceback would keep alive what it has met.
         raise errors.pop()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
-from .errors import WaitError
+from .errors import CallError, WaitError
 from .orders import Command, Edits, Forecast, Order
 
 if TYPE_CHECKING:
@@ -121,6 +122,10 @@ class AsyncRun:
         """As `Run.cancel`."""
         return await self._give(lambda: self.run.cancel(order, wait=False), timeout)
 
+    async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
+        """As `Run.change_pipelines`."""
+        return await self._give(lambda: self.run.change_pipelines(change, wait=False), timeout)
+
     async def drive(self, timeout: float = 8.0) -> None:
         """As `Run.drive`."""
         await asyncio.to_thread(self.run.drive, timeout)
@@ -128,6 +133,14 @@ class AsyncRun:
     async def surface(self) -> Surface:
         """As `Run.surface`."""
         return await asyncio.to_thread(lambda: self.run.surface)
+
+    async def stack(self) -> list[dict[str, Any]]:
+        """As `Run.stack`."""
+        return await asyncio.to_thread(lambda: self.run.stack)
+
+    async def pipelines(self) -> list[dict[str, Any]]:
+        """As `Run.pipelines`."""
+        return await asyncio.to_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
         """As `Run.wait_for`; `found` is called on another thread."""
@@ -139,18 +152,23 @@ class AsyncRun:
 
     async def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
         """As `Run.wait_for_view`."""
+        await asyncio.to_thread(self.run._announced, name, timeout)
         return await _in_slices(lambda left: self.run.wait_for_view(name, after=after, timeout=left), timeout)
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """As `Run.wait`."""
         return await _in_slices(self.run.wait, timeout)
 
-    async def events(self, *kinds: str) -> AsyncIterator[Event]:
-        """As `Run.events`."""
-        reader = self.run._reader
-        waiting = reader.listen()
+    def events(self, *kinds: str) -> AsyncIterator[Event]:
+        """As `Run.events`, for `async for`."""
+        return self._events(self.run._reader.listen(), kinds)
+
+    async def _events(self, waiting: deque[Event], kinds: tuple[str, ...]) -> AsyncIterator[Event]:
         while True:
-            event = await _in_slices(lambda left: reader.next(waiting, left), None)
+            try:
+                event = await _in_slices(lambda left: self.run._reader.next(waiting, left), None)
+            except CallError:
+                return
             if not kinds or event.kind in kinds:
                 yield event
             if event.kind == "ended":

@@ -24,6 +24,9 @@ _LOCK = threading.Lock()
 class Connection:
     """A run that a thread of its own connects to. What is not there yet is None.
 
+    Once the run has ended it is looked for again: another one may be under way behind the same link, such as a file.
+    Until then all stays as it was.
+
     Attributes
     ----------
     link : str
@@ -46,16 +49,20 @@ class Connection:
         self._ask()
 
     def _ask(self) -> None:
-        """Try, unless it is being tried, has come or has failed just now."""
+        """Try, unless it is being tried, is there or was tried just now."""
         is_trying = self._thread is not None and self._thread.is_alive()
-        if self.run is None and not is_trying and clock.monotonic() >= self._again:
+        is_there = self.run is not None and self.run.connected
+        if not is_there and not is_trying and clock.monotonic() >= self._again:
+            self._again = clock.monotonic() + _AGAIN
             self._thread = threading.Thread(target=self._connect, name="tombolo-connection", daemon=True)
             self._thread.start()
 
     def _connect(self) -> None:
         try:
-            run = connect(self.link)
-            self.run, self.failure = run, None
+            run, before = connect(self.link), self.run
+            self.run, self.surface, self.failure = run, None, None
+            if before is not None:
+                before.close()
             # Before the first step there is no mesh.
             run.wait_for(lambda: run.features, None)
             self.surface = run.surface

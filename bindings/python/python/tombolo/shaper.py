@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time as clock
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
 
@@ -11,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
+from ._waiting import in_thread
 from .mesh import Cells, Faces, Mesh, faces_of_features
 from .orders import Forecast
 from .views import Surface
@@ -251,36 +250,9 @@ class Shaper:
         self._shaper.cancel()
 
     def _work(self, call: Callable[[], Result], progress: Optional[Progress]) -> Result:
-        """A call on a thread of its own, so that this one can be interrupted."""
+        """A call that can be interrupted: it is given up before the mesh can be used again."""
         self._shaper.renew()
-        results: list[Result] = []
-        errors: list[BaseException] = []
-        done = threading.Event()
-
-        def work() -> None:
-            try:
-                results.append(call())
-            except BaseException as error:
-                errors.append(error)
-            finally:
-                done.set()
-
-        begun = clock.monotonic()
-        threading.Thread(target=work, name="tombolo-shaper", daemon=True).start()
-        try:
-            while True:
-                if progress is not None:
-                    progress(clock.monotonic() - begun)
-                if done.wait(0.1 if progress is not None else 1.0):
-                    break
-        except BaseException:
-            # It is given up before the mesh can be used again.
-            self._shaper.cancel()
-            done.wait()
-            raise
-        if errors:
-            raise errors[0]
-        return results[0]
+        return in_thread(call, progress, self._shaper.cancel)
 
     def __repr__(self) -> str:
         return f"<tombolo.Shaper, features: {', '.join(feature['name'] for feature in self.features)}>"

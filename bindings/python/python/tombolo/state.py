@@ -114,10 +114,13 @@ class State:
             return None
         elif kind != "lost":
             identity = data.get("id")
+            is_known = kind != "unknown"
             kind, data = next((key, value) for key, value in data.items() if key != "id")
             if isinstance(data, dict):
                 identity = data.get("id", identity)
-            self._take_message(kind, data, identity)
+            # One of a known name may have a form of another version: whoever listens is told all the same.
+            if is_known:
+                self._take_message(kind, data, identity)
         return Event(kind, data)
 
     def _take_message(self, kind: str, data: Any, identity: Optional[str]) -> None:

@@ -1,10 +1,10 @@
 //! Collections of files over time (.pvd), as ParaView opens them.
 
-use std::fs::File;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::super::error::{FileError, Flaw};
+use super::super::whole::write_longer;
 use super::super::write_atomically;
 
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
@@ -75,15 +75,8 @@ impl Series {
     pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
         let entry = entry(directory, time, file);
-        let old = File::open(&self.path).map_err(|error| Flaw::from(error).in_file(&self.path))?;
-        write_atomically(&self.path, |new| {
-            let copied = std::io::copy(&mut old.take(self.length), new)?;
-            if copied < self.length {
-                return Err(std::io::Error::other("the series was cut short by another program"));
-            }
-            new.write_all(entry.as_bytes())?;
-            new.write_all(TAIL.as_bytes())
-        })?;
+        write_longer(&self.path, self.length, &entry, TAIL)
+            .map_err(|error| Flaw::from(error).in_file(&self.path))?;
         self.length += entry.len() as u64;
         Ok(())
     }

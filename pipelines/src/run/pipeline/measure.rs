@@ -20,18 +20,19 @@ impl Prepared {
         let [mut cells, mut inverted] = [quality.cells as f64, quality.inverted as f64];
         let (mut min, mut max, mut mean) = (quality.min, quality.max, quality.mean);
         if progress.communicator.size() > 1 {
-            let none = quality.cells == 0;
-            let mut extremes = if none { [f64::NEG_INFINITY; 2] } else { [-min, max] };
-            progress.communicator.reduce(Reduction::Maximum, &mut extremes);
+            let none = [f64::INFINITY, f64::NEG_INFINITY];
+            let mut range = [if quality.cells == 0 { none } else { [min, max] }];
+            progress.communicator.join_ranges(&mut range);
             let mut sums = [cells, inverted, mean * cells];
             progress.communicator.reduce(Reduction::Sum, &mut sums);
             [cells, inverted] = [sums[0], sums[1]];
-            (min, max) = if cells > 0.0 { (-extremes[0], extremes[1]) } else { (1.0, 1.0) };
+            [min, max] = if cells > 0.0 { range[0] } else { [1.0; 2] };
             mean = if cells > 0.0 { sums[2] / cells } else { 1.0 };
         }
         progress.values.extend([min, mean, max, inverted]);
-        let wanted = self.wants(QUALITY_FIELD);
-        if let Some(extracted) = progress.extracted.as_mut().filter(|_| wanted) {
+        // A field of the solver of that name stays.
+        let is_added = self.wants(QUALITY_FIELD) && !progress.offers(QUALITY_FIELD);
+        if let Some(extracted) = progress.extracted.as_mut().filter(|_| is_added) {
             extracted.add_element_field(
                 QUALITY_FIELD,
                 &progress.source.scaled_jacobians(progress.channel),

@@ -134,6 +134,11 @@ impl Progress<'_> {
     fn is_bare(&self) -> bool {
         self.communicator.size() > 1 && self.channel.mesh.points.is_empty()
     }
+
+    /// Whether the solver has a field of this name.
+    fn offers(&self, field: &str) -> bool {
+        self.channel.fields.iter().any(|known| known.name == field)
+    }
 }
 
 impl Prepared {
@@ -452,9 +457,7 @@ impl Prepared {
                 }
                 let named =
                     self.selected.as_ref().is_some_and(|selected| selected.contains(QUALITY_FIELD));
-                let offered =
-                    progress.channel.fields.iter().any(|field| field.name == QUALITY_FIELD);
-                if named && !offered {
+                if named && !progress.offers(QUALITY_FIELD) {
                     extracted.add_element_field(
                         QUALITY_FIELD,
                         &progress.source.scaled_jacobians(progress.channel),
@@ -487,7 +490,7 @@ impl Prepared {
         if progress.extracted.is_none() && !has_source {
             let fields = with_derived(progress.channel, &progress.derived);
             let channel = Channel { fields: &fields, ..*progress.channel };
-            let wanted = |field: &str| self.wants(field);
+            let wanted = |field: &str| self.wants(field) || self.used.contains(field);
             let taken = progress.source.whole(&channel, progress.snapshot.cycle, &wanted);
             self.keep(taken, "mesh", progress);
         }

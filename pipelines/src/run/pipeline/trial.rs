@@ -44,8 +44,9 @@ impl Prepared {
         channel: &Channel,
         source: &mut Source,
         communicator: &dyn Communicator,
+        parameters: &[(String, f64)],
     ) -> Result<Vec<Frame>, String> {
-        let board = Board::default();
+        let board = Board { parameters: parameters.to_vec(), ..Board::default() };
         let mut outputs = Vec::new();
         let mut progress =
             self.begin(snapshot, channel, source, communicator, &board, &mut outputs);

@@ -1,0 +1,268 @@
+"""What is known of a run that goes on elsewhere, the waits for it, and its events."""
+
+from __future__ import annotations
+
+import atexit
+import weakref
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, Optional, TypeVar
+
+from . import _json, _native
+from ._reader import Reader
+from ._waiting import in_thread
+from .errors import EndedError, WaitError
+from .events import Callbacks, Event, iterate
+from .monitors import Monitors
+from .state import Parameter, State, Status
+from .views import Surface, View
+
+Found = TypeVar("Found")
+
+#: How long a view that nobody knows may take to be announced, in seconds.
+_ANNOUNCED = 2.0
+
+_RUNS: weakref.WeakSet[Watched] = weakref.WeakSet()
+
+
+class Watched:
+    """What a client does that only watches; a `Run` steers too."""
+
+    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int) -> None:
+        self.link = link
+        self._watch = watch
+        self._state = State()
+        self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
+        self._callbacks = Callbacks(self._reader)
+        _RUNS.add(self)
+        try:
+            self.wait_for(lambda: bool(self._state.hello), 20.0)
+        except BaseException:
+            self.close()
+            raise
+
+    # ---- What is known.
+
+    @property
+    def status(self) -> Status:
+        """How far the solver is, as it was last told; waits for the first status."""
+        if self._state.status is None:
+            self.wait_for(lambda: self._state.status is not None, 20.0)
+        status = self._state.status
+        assert status is not None
+        return status
+
+    @property
+    def monitors(self) -> Monitors:
+        """For each pipeline that has monitors a table that grows."""
+        return self._state.monitors
+
+    @property
+    def views(self) -> Mapping[str, View]:
+        """The newest frame of each live view that has come."""
+        return MappingProxyType(self._state.views)
+
+    @property
+    def hello(self) -> Mapping[str, Any]:
+        """What there is in the run, as docs/protocol.md says it; the newest that was told."""
+        return MappingProxyType(self._state.hello)
+
+    @property
+    def view_names(self) -> list[str]:
+        """The names of the live views."""
+        return [view["name"] for view in self._state.hello.get("views", [])]
+
+    @property
+    def features(self) -> list[dict[str, Any]]:
+        """The named parts of the surface, each with `name`, `faces`, `vertices` and `bounds`."""
+        return list(self._state.hello.get("features", []))
+
+    @property
+    def fields(self) -> list[dict[str, Any]]:
+        """The fields of the steered channel, each with `name`, `association` and `components`."""
+        return list(self._state.hello.get("fields", []))
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The numbers of the solver that can be steered."""
+        told = self._state.hello.get("parameters", [])
+        return {it["name"]: Parameter(it["value"], it["minimum"], it["maximum"]) for it in told}
+
+    @property
+    def stack(self) -> list[dict[str, Any]]:
+        """The edits that make the present shape, the oldest first, as the run answers now."""
+        edits: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.stack))
+        return edits
+
+    @property
+    def edit_count(self) -> int:
+        """How many edits make the present shape, as it was last told: without a wait, unlike `stack`."""
+        return int(self._state.stack.get("edits", 0))
+
+    @property
+    def drives(self) -> bool:
+        """Whether this client steers."""
+        return self._reader.drives
+
+    @property
+    def end(self) -> Optional[dict[str, Any]]:
+        """How the run has ended, where it has: `how` (`finished`, `stopped` or `failed`), `cycle` and `time`."""
+        return self._state.end
+
+    @property
+    def connected(self) -> bool:
+        """Whether anything can still come: the run has not ended, and the connection is not given up."""
+        return self._reader.failure is None and not self._reader.closed
+
+    @property
+    def missed(self) -> int:
+        """How many events made way for newer ones before they were read."""
+        return self._reader.missed
+
+    @property
+    def surface(self) -> Surface:
+        """The reference surface, from which all shapes are measured.
+
+        Raises
+        ------
+        LinkError
+            Where there is no mesh whose shape could be changed, or not yet.
+        """
+        return Surface(**in_thread(self._reader.client.surface))
+
+    @property
+    def pipelines(self) -> list[dict[str, Any]]:
+        """The pipelines as they are now."""
+        pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.pipelines))
+        return pipelines
+
+    # ---- Waiting.
+
+    def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
+        """Wait until `found` returns something true, and return that.
+
+        It is called again whenever the run has told something. Ctrl-C ends the wait.
+
+        Parameters
+        ----------
+        found : callable
+            Looks at what is known, such as ``lambda: run.status.cycle > 100``. It must not wait itself.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Raises
+        ------
+        WaitError
+            It did not come in time.
+        EndedError, LinkError
+            It did not come before the run has ended, or the connection was lost for good.
+
+        Examples
+        --------
+        Waits until a monitor has settled within a hundredth over its last 50 rows::
+
+            table = run.monitors["outlet"]
+            def settled():
+                flow = table["flow"][-50:]
+                return len(flow) == 50 and np.ptp(flow) < 0.01 * abs(flow.mean())
+            run.wait_for(settled)
+        """
+        return self._reader.wait_for(found, timeout)
+
+    def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
+        """Wait until the solver has told a step from `cycle` on, and return its status."""
+
+        def found() -> Optional[Status]:
+            return self._state.status if self._state.status is not None and self._state.status.cycle >= cycle else None
+
+        status = self.wait_for(found, timeout)
+        assert status is not None
+        return status
+
+    def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
+        """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
+
+        def found() -> Optional[View]:
+            view = self._state.views.get(name)
+            return view if view is not None and (after is None or view.cycle > after) else None
+
+        self._announced(name, timeout)
+        view = self.wait_for(found, timeout)
+        assert view is not None
+        return view
+
+    def _announced(self, name: str, timeout: Optional[float] = None) -> None:
+        """An error where there is no view of a name, nor comes to be one."""
+        if not self.view_names or name in self.view_names:
+            return
+        # A view that was added a moment ago is announced a moment later.
+        try:
+            self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
+        except WaitError:
+            raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
+
+    def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
+        """Wait until the run has ended, and return how."""
+        try:
+            end = self.wait_for(lambda: self._state.end, timeout)
+        except EndedError:
+            end = self._state.end
+        return end or {"how": "unknown"}
+
+    # ---- Events.
+
+    def events(self, *kinds: str, timeout: Optional[float] = None) -> Iterator[Event]:
+        """Iterate over what the run tells from now on, until it ends.
+
+        Parameters
+        ----------
+        *kinds : str
+            Only events of these kinds; without any, all.
+        timeout : float, optional
+            Seconds to wait for each, at most.
+
+        Yields
+        ------
+        Event
+            Each event, in the order in which they came. Of more than 4096 that wait the oldest make way.
+
+        Raises
+        ------
+        WaitError
+            None came in time.
+        """
+        return iterate(self._reader, self._reader.listen(), kinds, timeout)
+
+    def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
+        """Have a function called with each event of a kind, or with every one where `kind` is None.
+
+        It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
+        printed, and it is called again.
+
+        Returns
+        -------
+        callable
+            Call it to have the function called no more.
+        """
+        return self._callbacks.add(kind, callback)
+
+    # ---- The end.
+
+    def close(self) -> None:
+        """Close the connection. The run goes on."""
+        self._reader.close()
+
+    def __repr__(self) -> str:
+        # The link has a secret in it.
+        place = self.link.split("?")[0]
+        if self._state.end is not None:
+            return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
+        cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
+        return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
+
+
+@atexit.register
+def _close_all() -> None:
+    # A thread that reads must not outlive the interpreter.
+    for run in list(_RUNS):
+        run.close()
