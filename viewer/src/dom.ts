@@ -30,6 +30,13 @@ export function write(target: Element, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }
 
+/** The kinds of input that take no text. */
+const NO_TEXT = ["button", "checkbox", "color", "file", "radio", "range", "reset", "submit"].map((type) => `:not([type=${type}])`).join("");
+const TEXT = `textarea, input${NO_TEXT}, [contenteditable]:not([contenteditable=false]), .cm-editor`;
+
+/** The field in which somebody types whose key this is, the editor of pipelines among them; null where the key is no text. */
+export const textField = (target: EventTarget | null): HTMLElement | null => (target as HTMLElement | null)?.closest?.<HTMLElement>(TEXT) ?? null;
+
 /** A label that is unique in the page. */
 let count = 0;
 export const identifier = (stem: string): string => `${stem}-${++count}`;

@@ -11,12 +11,13 @@ import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
 import { publish } from "./inspection";
-import { History } from "./history/series";
+import { History, seriesKey } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
+import { own } from "./own";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -92,7 +93,11 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
 const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
 
-const stack = new Stack(addresses.stack, () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }), report);
+const stack = new Stack(addresses.stack, {
+  awaited: () => store.dispatch({ type: "stack awaited", undoable: stack.told.undoable }),
+  changed: () => store.dispatch({ type: "stack", edits: stack.edits, undoable: stack.told.undoable }),
+  trouble: report,
+});
 const commands = new Commands(store, (message) => connection.send(message));
 const pipelines = new Pipelines(() => loadJson(addresses.pipelines), (message) => commands.send(message), (reason) => report(`the pipelines: ${reason}`));
 store.watch((state) => [state.connection.state, state.hello?.pipelines?.changes] as const, ([state, changes]) => {
@@ -120,7 +125,7 @@ const selection = new Selection(store);
 const triad = new Triad();
 /** A field and its component in words. */
 const fieldTitle = (field: string | null, component: number): string =>
-  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, FIELD_TITLES[field ?? ""]);
+  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
 /** The unit of a field; null where none is given. */
 const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
@@ -128,7 +133,7 @@ const titleWithUnit = (field: string | null, component: number): string => withU
 let shownBars: Bar[] = [];
 const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
-    const look = store.state.looks[view];
+    const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
@@ -240,7 +245,7 @@ function contentOf(view: string): Content | null {
 }
 const monitored = new History();
 const history = new HistoryPlot(monitored, kept.dock.chosen, (chosen) => { kept.dock = { ...kept.dock, chosen }; });
-const lookOf = (view: string | null): Look | null => (view === null ? null : store.state.looks[view] ?? null);
+const lookOf = (view: string | null): Look | null => (view === null ? null : own(store.state.looks, view) ?? null);
 const linePlot = new LinePlot(store, pipelines, {
   frame: () => scene.layers.get(LINE)?.frame ?? null, look: () => lookOf(store.state.chosenView), title: ({ field, component }) => titleWithUnit(field, component),
 }, earlier, () => dock.update());
@@ -267,7 +272,7 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
   },
   trouble: report,
 });
-const pins: Pins = new Pins(monitored, marks, (probe) => scene.read(probe), ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
+const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
   history.choose(key);
   dock.choose(history);
 });
@@ -326,7 +331,7 @@ function takeMessage(message: ServerMessage): void {
       if (message.body.status === "applied") pipelines.answered(message.body.id);
       return store.dispatch({ type: "pipelines outcome", change: message.body });
     // The status shows what it has changed.
-    case "done": return;
+    case "done": return parameters.done(message.body.id);
     case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
     case "link": return void people.take(message.body);
@@ -341,7 +346,7 @@ function takeMessage(message: ServerMessage): void {
       return store.dispatch({ type: "end", end: message.body });
     case "error": {
       const { id, message: text } = message.body;
-      if (pipelines.answered(id)) void pipelines.told(-2);
+      if (pipelines.answered(id)) void pipelines.reload();
       if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
@@ -360,7 +365,7 @@ function takeMonitor(monitor: Monitor): void {
 function takeHello({ stack: told, ...hello }: ToldHello): void {
   // Until the edits of a new connection are here, those of before are shown.
   if (told) stack.begin(told);
-  store.dispatch({ type: "hello", hello: { ...hello, stack: stack.edits, undoable: stack.told.undoable } });
+  store.dispatch({ type: "hello", hello: { ...hello, stack: stack.edits, isAwaitingEdits: !stack.isWhole, undoable: stack.told.undoable } });
 }
 
 function takeFrame(frame: Frame): void {
@@ -373,6 +378,10 @@ store.watch((state) => state.hello, (hello) => {
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
+  if (hello.monitors) {
+    monitors.keep(hello.monitors);
+    monitored.keep(hello.monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
+  }
   if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
 
@@ -410,10 +419,11 @@ store.watch((state) => state.errors, (errors) => {
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
 /** What is said in place of the picture, as long as there is none. */
-function emptyText({ frames, connection: { state }, hello, end }: State): [string, string] {
+function emptyText({ frames, connection: { state, explanation }, hello, end }: State): [string, string] {
   if (frames.count > 0) return ["", ""];
   if (end) return ["The run has ended", "No picture came before its end."];
   if (state === "refused") return ["This link does not open the simulation", "It was used already, or is of another run. Open a link that this simulation told when it started."];
+  if (state === "dismissed") return ["Not connected", explanation];
   if (state !== "connected") return ["Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there."];
   if (hello && hello.views.length === 0) return ["Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage."];
   return ["Connected", "The first picture appears when the simulation has taken its next step."];
@@ -424,12 +434,13 @@ part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
 store.watch((state) => ({ views: state.hello?.views ?? [], looks: state.looks, held: isShapeUnderWay(state.orders) }),
-  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held), sameJson);
+  ({ views, looks, held }) => scene.setLooks(views, onlyView === null ? looks : onlyLook(looks, onlyView), held),
+  (a, b) => a.held === b.held && sameJson(a.looks, b.looks) && sameJson(a.views, b.views));
 store.watch((state) => state.looks, (looks) => {
   kept.looks = looks;
   compare.update();
 });
-store.watch((state) => appliedOrders(state.orders), (marks) => history.setMarks(marks), sameJson);
+store.watch(appliedOrders, (marks) => history.setMarks(marks));
 
 part("skeleton").addEventListener("click", (event) => {
   const button = event.currentTarget as HTMLButtonElement;
@@ -481,7 +492,6 @@ publish({
   featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
 });
 
-kernel.catch((error: unknown) => report(String(error)));
 stream.listen({
   state: (state, explanation) => store.dispatch({ type: "connection", state, explanation }),
   message: takeMessage,

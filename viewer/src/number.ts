@@ -32,7 +32,7 @@ export function seconds(value: number | null | undefined): string {
 
 /** Reads a number as a person writes one; null when it is none. */
 export function readNumber(text: string): number | null {
-  const plain = text.trim().replace("−", "-").replace(",", ".");
+  const plain = text.trim().replaceAll("−", "-").replace(",", ".");
   if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain)) return null;
   const value = Number(plain);
   return Number.isFinite(value) ? value : null;

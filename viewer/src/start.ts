@@ -12,8 +12,9 @@ export const addresses = streamAddress(window.location.href);
 /** The kernel decodes the frames and computes the previews: it is fetched once, at once. */
 export const kernel = compileKernel();
 const worker = new Worker(new URL("./connection/decode.worker.ts", import.meta.url), { type: "module" });
-kernel.then((module) => worker.postMessage({ module }), () => undefined);
 export const stream = new Stream(addresses, worker as unknown as DecodeWorker);
+kernel.then((module) => worker.postMessage({ module }), (error: unknown) => stream.fail(error instanceof Error ? error.message : String(error)));
+worker.addEventListener("error", (event) => stream.fail(event.message || "what decodes its frames could not be started"));
 // A viewer that was here before comes back under its name.
 stream.connection.identity = knownIdentity();
 stream.connection.start();

@@ -101,6 +101,14 @@ export class Connection {
     this.change("ended", "");
   }
 
+  /** Ends the connection because this page can do nothing with it, and says why; `retry` begins another. */
+  dismiss(why: string): void {
+    if (this.closed) return;
+    this.clearTimer();
+    this.letGo();
+    this.change("dismissed", why);
+  }
+
   /** Tries again at once, if a connection is not there already. */
   retry(): void {
     if (this.state !== "dismissed" && (this.state === "connected" || this.timer === null)) return;
@@ -153,6 +161,8 @@ export class Connection {
   }
 
   private open(): void {
+    // One that was being opened is not waited for any more.
+    this.letGo();
     let socket: WebSocket;
     try {
       const identity = this.identity === null ? "" : `?${new URLSearchParams({ ...this.identity }).toString()}`;
@@ -181,9 +191,8 @@ export class Connection {
         message = parseServerMessage(event.data);
       } catch (error) {
         if (error instanceof VersionError) {
-          this.letGo();
           const older = typeof error.found === "number" && error.found < PROTOCOL_VERSION;
-          return this.change("dismissed", `This page and the simulation do not understand each other: ${error.message}. `
+          return this.dismiss(`This page and the simulation do not understand each other: ${error.message}. `
             + (older ? "The simulation is older than this page: open the page that it serves itself." : "Reload the page to get the one that belongs to the simulation."));
         }
         this.listener.trouble(error instanceof Error ? error.message : String(error));
@@ -209,7 +218,7 @@ export class Connection {
   private async lost(opened: boolean, reason: string): Promise<void> {
     // A browser does not say why an opening failed; an ordinary request to the same address does.
     const answer = opened ? null : await this.surroundings.probe(this.target.probe);
-    if (this.closed) return;
+    if (this.closed || this.socket) return;
     if (answer?.status === 401) {
       this.again("refused", "The simulation does not know this browser, or another one runs here now.", REFUSED_DELAY);
     } else if (answer?.status === 403) {

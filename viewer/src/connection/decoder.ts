@@ -19,8 +19,15 @@ export interface DecoderEvents {
   lost(reason: string): void;
 }
 
+/**
+ * The most bytes that wait. The server sends two frames of a view ahead, but does not count as long as none was acknowledged: a decoder
+ * that never begins would otherwise fill the memory.
+ */
+export const MOST_WAITING = 512 * 2 ** 20;
+
 export class Decoder {
   private waiting: ArrayBuffer[] = [];
+  private bytes = 0;
   private busy = false;
   private generation = 0;
   private sent = 0;
@@ -31,13 +38,19 @@ export class Decoder {
   }
 
   push(message: ArrayBuffer): void {
+    if (this.waiting.length > 0 && this.bytes + message.byteLength > MOST_WAITING) {
+      this.clear();
+      return this.events.lost(`more than ${MOST_WAITING / 2 ** 20} MiB of frames wait to be decoded`);
+    }
     this.waiting.push(message);
+    this.bytes += message.byteLength;
     this.next();
   }
 
   /** Forgets everything that waits: the connection it came from is gone. */
   clear(): void {
     this.waiting = [];
+    this.bytes = 0;
     this.count = 0;
     this.generation++;
   }
@@ -46,6 +59,7 @@ export class Decoder {
     if (this.busy) return;
     const message = this.waiting.shift();
     if (!message) return;
+    this.bytes -= message.byteLength;
     this.busy = true;
     this.sent = this.generation;
     this.worker.postMessage(message, [message]);

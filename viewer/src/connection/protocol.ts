@@ -57,6 +57,8 @@ export interface Hello {
   fields: FieldInformation[];
   parameters: ParameterInformation[];
   stack: Json[];
+  /** Whether the run's stack is another one, whose edits are being fetched. */
+  isAwaitingEdits?: boolean;
   /** How many orders can be taken back. */
   undoable?: number | undefined;
   orders: OrderStatus[];
@@ -68,7 +70,7 @@ export interface Hello {
 }
 
 /** The message of the server: the edits themselves are fetched. `stack` is in the first of a connection. */
-export type ToldHello = Omit<Hello, "stack" | "undoable"> & { stack?: StackInformation };
+export type ToldHello = Omit<Hello, "stack" | "isAwaitingEdits" | "undoable"> & { stack?: StackInformation };
 
 export interface QualitySummary { min: number; mean?: number; inverted?: number }
 

@@ -24,6 +24,8 @@ export class Stream {
   private kept: ((listener: StreamListener) => void)[] = [];
   /** Frames of this connection that were decoded before somebody listened. */
   private unacknowledged = 0;
+  /** Why no frame can ever be decoded on this page; empty where they can. */
+  private failure = "";
 
   constructor(target: { address: string; probe: string }, worker: DecodeWorker, surroundings?: Surroundings) {
     this.connection = new Connection(target, {
@@ -37,7 +39,8 @@ export class Stream {
       message: (message) => this.tell((listener) => listener.message(message)),
       binary: (bytes) => {
         this.tell((listener) => listener.alive());
-        this.decoder.push(bytes);
+        if (this.failure === "") this.decoder.push(bytes);
+        else this.connection.dismiss(this.failure);
       },
       trouble: (text) => this.tell((listener) => listener.trouble(text)),
     }, surroundings);
@@ -49,6 +52,13 @@ export class Stream {
       },
       lost: (reason) => this.connection.renew(`A frame could not be read: ${reason}.`),
     });
+  }
+
+  /** Gives the connection up: what decodes frames could not be started. */
+  fail(reason: string): void {
+    if (this.failure !== "") return;
+    this.failure = `This page cannot show the simulation: ${reason}. Reload the page.`;
+    this.connection.dismiss(this.failure);
   }
 
   /** Hands out what was kept, and from now on whatever comes. */

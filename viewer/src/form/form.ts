@@ -21,8 +21,8 @@ export class EditForm {
   private edits: Control[] = [];
   private settings: Control = keepingControl();
   private readonly table = element("div", { class: "features", role: "group", "aria-label": "Features" });
-  /** What the controls show, as they were last read or written. */
-  private shown: { key: string | null; body: Values; settings: Values } = { key: null, body: {}, settings: {} };
+  /** What the controls show, as they were last read or written; null for settings that cannot be sent. */
+  private shown: { key: string | null; body: Values; settings: Values | null } = { key: null, body: {}, settings: {} };
 
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
     store.watch((state) => state.form, (form) => this.build(form));
@@ -153,8 +153,12 @@ export class EditForm {
     }
     const problems: Problem[] = [];
     const body = (this.edits[index]!.read(problems) ?? {}) as Values;
-    const settings = (this.settings.read(problems) ?? {}) as Values;
-    this.shown = { key: edit.key, body, settings };
+    const wrong: Problem[] = [];
+    const read = (this.settings.read(wrong) ?? {}) as Values;
+    // A setting that cannot be sent stays what it was: an edit that is then made in the picture goes with it, and it is shown again.
+    const settings = wrong.length > 0 ? { ...this.store.state.draft.settings, ...read } : read;
+    this.shown = { key: edit.key, body, settings: wrong.length > 0 ? null : settings };
+    problems.push(...wrong);
     this.store.dispatch({ type: "form read", key: edit.key, body, settings, problems, step: `input ${target.id || target.getAttribute("aria-label")}` });
   }
 }

@@ -3,7 +3,7 @@
  * is chosen is the `region` of the edit in the form.
  */
 import type { Json, Vector } from "../connection/protocol";
-import { element, identifier } from "../dom";
+import { element, identifier, textField } from "../dom";
 import { readNumber } from "../number";
 import type { ShownPoints } from "../preview/previewer";
 import type { Action } from "../store/actions";
@@ -174,6 +174,9 @@ export class FaceTools implements ShapeRegion {
 
   private key(event: KeyboardEvent): void {
     if (event.key !== "Escape" || !this.tool) return;
+    // What somebody types elsewhere is left with the key.
+    const field = textField(event.target);
+    if (field && !this.stroke && !this.bar.contains(field)) return;
     event.stopPropagation();
     if (this.stroke) {
       this.stroke = null;

@@ -3,6 +3,7 @@
  * composes the edit in the form; the preview and the forecast follow from there.
  */
 import type { Vector } from "../connection/protocol";
+import { textField } from "../dom";
 import { showTip } from "../picture/overlay";
 import type { Action } from "../store/actions";
 import type { Bones } from "../picture/skeleton";
@@ -304,7 +305,8 @@ export class Handles {
     if (!gesture) return this.start(event);
     if (event.key === "Control" || event.key === "Meta" || event.key === "Shift") return this.modified(event);
     if (gesture.hasMoved && !this.press && event.key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey)) return this.close();
-    const isElsewhere = !this.box.isFocused && (event.target as HTMLElement | null)?.closest?.("input, select, textarea, button, summary");
+    const target = event.target as HTMLElement | null;
+    const isElsewhere = !this.box.isFocused && (textField(target) ?? target?.closest?.("input, select, button, summary"));
     if (isElsewhere && !this.press) return;
     const axis = ["x", "y", "z"].indexOf(event.key.toLowerCase());
     if (event.key === "Escape") this.abort();

@@ -2,6 +2,7 @@
 import uPlot from "uplot";
 import { element, write } from "../dom";
 import { digits } from "../number";
+import { own } from "../own";
 import type { Content, Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
@@ -38,7 +39,7 @@ export class HistogramPlot extends ValuePlot {
 
   protected draw(): void {
     const { chosenView, looks } = this.store.state;
-    const look = chosenView === null ? undefined : looks[chosenView];
+    const look = chosenView === null ? undefined : own(looks, chosenView);
     const of = (content: Content | null | undefined): Weighted | null =>
       content && look?.field != null ? weighted(content.topology, content.frame, look.field, look.component) : null;
     const content = chosenView === null ? null : this.source.content(chosenView);

@@ -7,7 +7,7 @@ import { digits, readNumber } from "../number";
 import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
-import { LINE, lineBetween, lineOf } from "../store/pipelines";
+import { LINE, lineBetween, lineOf, withLine } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
@@ -67,7 +67,12 @@ export class LinePlot extends ValuePlot {
 
   /** Asks the run for the fields between two points. */
   take(from: Vector, to: Vector): void {
-    this.pipelines.set(lineBetween(from, to));
+    const known = this.pipelines.get(LINE);
+    if (known && !lineOf(known)) {
+      // It is somebody's own, under the name that the plot would use.
+      return this.store.dispatch({ type: "refused", id: null, text: `The run has a pipeline “${LINE}” that takes no line: under another name it would leave room for this one.` });
+    }
+    this.pipelines.set(known ? withLine(known, from, to) : lineBetween(from, to));
     this.follow();
   }
 

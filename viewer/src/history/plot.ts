@@ -73,7 +73,7 @@ export class HistoryPlot implements Tab {
 
   /** The orders that have taken effect. */
   setMarks(marks: readonly Mark[]): void {
-    if (JSON.stringify(marks) === JSON.stringify(this.marks)) return;
+    if (marks === this.marks) return;
     this.marks = marks;
     this.plot?.redraw(false);
     this.values();

@@ -2,7 +2,7 @@
 
 /** The most times of one source. Where there are more, every other one of the older half is forgotten. */
 export const TIMES = 2000;
-/** The most values that are kept side by side; later ones are not. */
+/** The most values that are kept side by side; later ones are not, unless one of a monitor that is no more makes room. */
 export const SERIES = 200;
 
 /** Values that come together, such as those of one pipeline. */
@@ -14,6 +14,9 @@ export interface Series { key: string; source: string; name: string; unit: strin
 export class History {
   private readonly sources = new Map<string, Source>();
   private readonly list = new Map<string, Series>();
+  /** The monitors that there are, by the keys of their series, and those of before. */
+  private monitors: ReadonlySet<string> = new Set();
+  private readonly ended = new Set<string>();
 
   /** The series in the order in which they came up. */
   get series(): Series[] {
@@ -30,7 +33,7 @@ export class History {
       this.sources.set(source, kept);
     }
     for (const name of Object.keys(values)) {
-      if (kept.columns.has(name) || this.list.size >= SERIES) continue;
+      if (kept.columns.has(name) || (this.list.size >= SERIES && !this.makeRoom(kept))) continue;
       kept.columns.set(name, new Array<null>(kept.cycles.length).fill(null));
       const key = seriesKey(source, name);
       this.list.set(key, { key, source, name, unit: this.list.get(key)?.unit ?? null });
@@ -47,6 +50,28 @@ export class History {
   setUnit(source: string, name: string, unit: string | null): void {
     const series = this.list.get(seriesKey(source, name));
     if (series) series.unit = unit;
+  }
+
+  /** The series of the monitors that there are now. Those that there were keep theirs for as long as there is room. */
+  keep(monitors: readonly string[]): void {
+    const now = new Set(monitors);
+    for (const key of this.monitors) if (!now.has(key) && this.list.has(key)) this.ended.add(key);
+    for (const key of now) this.ended.delete(key);
+    this.monitors = now;
+  }
+
+  /** Forgets the oldest series of a monitor that is no more; says whether there was one. `taking` is the source that takes its place. */
+  private makeRoom(taking: Source): boolean {
+    const [key] = this.ended;
+    if (key === undefined) return false;
+    this.ended.delete(key);
+    const series = this.list.get(key);
+    if (!series) return this.makeRoom(taking);
+    this.list.delete(key);
+    const source = this.sources.get(series.source);
+    source?.columns.delete(series.name);
+    if (source?.columns.size === 0 && source !== taking) this.sources.delete(series.source);
+    return true;
   }
 
   /** Forgets a source, and its series. */

@@ -28,8 +28,9 @@ const decoder = new TextDecoder();
 
 /** Compiles a module while it is still arriving; `title` names it in errors. */
 export async function compile(address: URL, title: string): Promise<WebAssembly.Module> {
-  const response = await fetch(address);
-  if (!response.ok) throw new KernelError("trap", `${title} did not arrive: ${response.status} ${response.statusText}`);
+  const lost = (why: string): KernelError => new KernelError("trap", `${title} did not arrive: ${why}`);
+  const response = await fetch(address).catch((error: unknown) => { throw lost(error instanceof Error ? error.message : String(error)); });
+  if (!response.ok) throw lost(`${response.status} ${response.statusText}`);
   return WebAssembly.compileStreaming(response);
 }
 

@@ -3,7 +3,7 @@
  * the form; every change here is an order of the whole new stack.
  */
 import type { Json } from "../connection/protocol";
-import { element, part, write } from "../dom";
+import { element, part, textField, write } from "../dom";
 import { isMuted, titleOf } from "../form/describe";
 import { digits, seconds } from "../number";
 import type { Action } from "../store/actions";
@@ -47,14 +47,16 @@ export class EditsPanel {
     const focus = this.focused();
     const { state } = this.store;
     const by = provenance(state.orders, this.stack);
-    this.list.replaceChildren(...this.stack.map((edit, i) => this.row(edit, i, by[i] ?? null)));
+    // While a name is being typed the list stays: a field that is taken away would end the typing half-way.
+    const isTyping = this.renaming !== null && this.list.contains(textField(document.activeElement));
+    if (!isTyping) this.list.replaceChildren(...this.stack.map((edit, i) => this.row(edit, i, by[i] ?? null)));
     part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
     this.pending.replaceChildren(...state.orders.filter(isPending).map((order) => this.pendingRow(order)),
       ...state.orders.filter((order) => isRefused(order) && !order.dismissed).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
     part("history").hidden = state.orders.length === 0;
     write(part("history-title"), `Everything that happened (${state.orders.length})`);
     this.history.replaceChildren(...[...state.orders].reverse().map(historyRow));
-    if (focus) (this.list.querySelector<HTMLElement>(focus.exact) ?? this.list.querySelector<HTMLElement>(focus.near) ?? part("undo")).focus();
+    if (focus && !isTyping) (this.list.querySelector<HTMLElement>(focus.exact) ?? this.list.querySelector<HTMLElement>(focus.near) ?? part("undo")).focus();
   }
 
   /** Where the focus is in the list, so that it can be put there again. */
@@ -90,7 +92,9 @@ export class EditsPanel {
       act("rename", "✎", "Rename", () => {
         this.renaming = index;
         this.show();
-        this.list.querySelector<HTMLInputElement>("input")?.select();
+        const input = this.list.querySelector<HTMLInputElement>("input");
+        input?.focus();
+        input?.select();
       }),
       act("remove", "×", "Delete", () => this.commands.setStack(remove(this.stack, index))));
     this.watchDrag(row, index);
@@ -104,7 +108,7 @@ export class EditsPanel {
       if (isOver) return;
       isOver = true;
       this.renaming = null;
-      if (name !== null && name.trim() !== before) this.commands.setStack(rename(this.stack, index, name));
+      if (name !== null && name.trim() !== before) this.rename(edit, index, name);
       this.show();
       this.list.querySelector<HTMLElement>(`[data-edit="${index}"] [data-act="rename"]`)?.focus();
     };
@@ -121,6 +125,13 @@ export class EditsPanel {
       onblur: () => end(input.value),
     });
     return input;
+  }
+
+  /** Gives an edit a name, if it still is the one in this place and the stack may be changed. */
+  private rename(edit: Json, index: number, name: string): void {
+    const why = whyNotEditable(this.store.state) || (sameJson(this.stack[index], edit) ? "" : "The edits have changed meanwhile.");
+    if (why === "") this.commands.setStack(rename(this.stack, index, name));
+    else this.store.dispatch({ type: "refused", id: null, text: `The edit was not renamed. ${why}` });
   }
 
   private key(event: KeyboardEvent, index: number): void {
@@ -204,7 +215,7 @@ export class EditsPanel {
 }
 
 function undoState(state: State): { undo: boolean; redo: boolean; why: string; composing: boolean } {
-  return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotSteering(state), composing: state.draft.past.length > 0 };
+  return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotEditable(state), composing: state.draft.past.length > 0 };
 }
 
 function partsName(edit: Json): string {

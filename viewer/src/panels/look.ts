@@ -2,6 +2,7 @@
 import type { FieldInformation } from "../connection/protocol";
 import { element, identifier, write } from "../dom";
 import { digits, readNumber, words } from "../number";
+import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
 import type { Bar } from "../picture/scene";
@@ -66,7 +67,7 @@ export class LookPanel {
 
   private get look(): Look | null {
     const { looks, chosenView } = this.store.state;
-    return chosenView === null ? null : looks[chosenView] ?? null;
+    return chosenView === null ? null : own(looks, chosenView) ?? null;
   }
 
   private change(look: Partial<Look>): void {
@@ -117,7 +118,7 @@ export class LookPanel {
     const fields: readonly FieldInformation[] = hello?.fields ?? [];
     // One that the library adds to a view is not among those of the solver.
     const names = [...new Set([...fields.map(({ name }) => name), ...(look.field === null ? [] : [look.field])])];
-    fill(this.field, [...names.map((name): [string, string] => [name, FIELD_TITLES[name] ?? words(name)]), ["", "none"]]);
+    fill(this.field, [...names.map((name): [string, string] => [name, own(FIELD_TITLES, name) ?? words(name)]), ["", "none"]]);
     write(this.unit, fields.find(({ name }) => name === look.field)?.unit ?? "");
     this.field.value = look.field ?? "";
     const count = fields.find((field) => field.name === look.field)?.components ?? 1;

@@ -10,7 +10,16 @@ import type { State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 
-interface Row { input: HTMLInputElement; wrong: HTMLElement }
+interface Row {
+  input: HTMLInputElement;
+  wrong: HTMLElement;
+  /** The value that the run has told last. */
+  told: number;
+  /** What was written into the input, or sent from it: with anything else in it somebody is about to set something. */
+  text: string;
+  /** What was typed last, as long as the run has not answered: under what name it was sent, null for not at all, and what the run had then. */
+  pending: { id: string | null; value: number; told: number } | null;
+}
 
 export class ParameterPanel {
   private readonly rows = new Map<string, Row>();
@@ -22,14 +31,47 @@ export class ParameterPanel {
     store.watch(shape, () => this.build(store.state.hello?.parameters ?? []), sameJson);
     store.watch((state) => state.hello?.parameters ?? [], (parameters) => this.show(parameters), sameJson);
     store.watch(whyNotSteering, (why) => this.allow(why));
+    store.watch(({ connection, hello }) => hello !== null && connection.state === "connected" && !connection.fresh, (isGreeted) => { if (isGreeted) this.greeted(); });
   }
 
   /** What the simulation says to a message of this panel; whether it was one. */
   refused(id: string, text: string): boolean {
+    const row = this.answered(id);
+    if (!row) return false;
+    mark(row.input, row.wrong, text);
+    // It stays there, beside what is wrong with it.
+    row.text = "";
+    return true;
+  }
+
+  /** A message of this panel has taken effect. */
+  done(id: string): void {
+    const row = this.rows.get(this.asked.get(id) ?? "");
+    const before = row?.pending?.told;
+    this.answered(id);
+    // Another viewer may have set it meanwhile. What the run has told before it had the message says nothing.
+    if (row && row.pending === null && before !== undefined && before !== row.told && row.input !== document.activeElement) this.write(row);
+  }
+
+  /** The parameter that a message was to set; the message is settled. */
+  private answered(id: string): Row | undefined {
     const row = this.rows.get(this.asked.get(id) ?? "");
     this.asked.delete(id);
-    if (row) mark(row.input, row.wrong, text);
-    return row !== undefined;
+    if (row?.pending?.id === id) row.pending = null;
+    return row;
+  }
+
+  /** A connection has begun: what was on its way over the one before may have been lost with it. */
+  private greeted(): void {
+    this.asked.clear();
+    for (const row of this.rows.values()) {
+      const { pending, told, input, wrong } = row;
+      row.pending = null;
+      if (!pending || pending.value === told) continue;
+      if (input !== document.activeElement) this.write(row);
+      const lost = pending.id === null ? `${numberText(pending.value)} was not sent` : `The connection was lost before ${numberText(pending.value)} was confirmed`;
+      mark(input, wrong, `${lost}; the run has ${numberText(told)}.`);
+    }
   }
 
   private build(parameters: readonly ParameterInformation[]): void {
@@ -42,10 +84,20 @@ export class ParameterPanel {
 
   private show(parameters: readonly ParameterInformation[]): void {
     for (const { name, value } of parameters) {
-      const input = this.rows.get(name)?.input;
+      const row = this.rows.get(name);
+      // What the run has not changed stays as it is: it may be on its way there.
+      if (!row || row.told === value) continue;
+      row.told = value;
+      if (row.pending?.value === value) row.pending = null;
       // A hand may be on it.
-      if (input && input !== document.activeElement) input.value = numberText(value);
+      if (row.input !== document.activeElement) this.write(row);
     }
+  }
+
+  /** Shows what the run has. */
+  private write(row: Row): void {
+    row.input.value = row.text = numberText(row.told);
+    mark(row.input, row.wrong, "");
   }
 
   private allow(why: string): void {
@@ -69,12 +121,17 @@ export class ParameterPanel {
         mark(input, wrong, typeof value === "number" ? "" : `${words(parameter.name)} ${value}`);
         if (typeof value !== "number") return;
         const sent = this.commands.setParameter(parameter.name, value);
-        if (sent === null) mark(input, wrong, "There is no connection to the simulation; nothing was sent.");
-        else this.asked.set(sent, parameter.name);
+        row.pending = { id: sent, value, told: row.told };
+        if (sent === null) return mark(input, wrong, "There is no connection to the simulation; nothing was sent.");
+        row.text = input.value;
+        this.asked.set(sent, parameter.name);
         if (this.asked.size > 100) this.asked.delete(this.asked.keys().next().value!);
       },
+      // What the run has told while the focus was there.
+      onblur: () => { if (input.value === row.text && row.pending === null && input.value !== numberText(row.told)) this.write(row); },
     });
-    this.rows.set(parameter.name, { input, wrong });
+    const row: Row = { input, wrong, told: parameter.value, text: input.value, pending: null };
+    this.rows.set(parameter.name, row);
     const bounded = typeof minimum === "number" && typeof maximum === "number";
     return element("div", { class: "field" }, element("label", { for: id }, words(parameter.name),
       bounded ? element("small", {}, `${digits(minimum, 3)} to ${digits(maximum, 3)}`) : null), input, wrong);

@@ -55,6 +55,9 @@ export class RecordingPanel {
     const text = `cycle ${played.cycle}, time ${digits(played.time)}`;
     write(part("moment-text"), text);
     this.slider.setAttribute("aria-valuetext", text);
+    // A connection that is made anew begins with another speed than was chosen before. Written where it differs: the list may be open.
+    const speed = String(played.speed);
+    if (this.speed.value !== speed) this.speed.value = speed;
     write(this.button, played.at_end ? "Again" : played.paused ? "Play" : "Pause");
   }
 }

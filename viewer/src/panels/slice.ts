@@ -3,6 +3,7 @@ import type { Pipelines } from "../connection/pipelines";
 import type { Vector } from "../connection/protocol";
 import { element, identifier, write } from "../dom";
 import { digits, readNumber } from "../number";
+import { own } from "../own";
 import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
 import type { Plane } from "../store/pipelines";
 import type { Sliced } from "../picture/slice-handle";
@@ -88,7 +89,7 @@ export class SlicePanel implements Sliced {
   }
 
   get movable(): Plane | null {
-    return whyNotSteering(this.store.state) === "" && this.store.state.looks[this.store.state.chosenView ?? ""]?.visible === true ? this.plane : null;
+    return whyNotSteering(this.store.state) === "" && own(this.store.state.looks, this.store.state.chosenView ?? "")?.visible === true ? this.plane : null;
   }
 
   /** Has the run cut there. */

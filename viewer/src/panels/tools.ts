@@ -1,5 +1,5 @@
 /** The toolbar over the picture: the camera; and the theme of the page. */
-import { part, write } from "../dom";
+import { part, textField, write } from "../dom";
 import type { Scene } from "../picture/scene";
 import type { Theme } from "../picture/theme";
 import type { Kept } from "../store/kept";
@@ -102,10 +102,11 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const target = event.target as HTMLElement | null;
-    const typing = target?.closest?.("input[type=text], textarea, select, dialog") != null;
+    // In a list of choices a letter looks for one.
+    const typing = textField(target) ?? target?.closest?.("select, dialog") ?? null;
     // A letter is for the picture where the pointer or the focus is there.
     const action = event.key === "?" ? () => keys.showModal() : pointer || target === picture ? actions[event.key] : undefined;
-    if (typing || !action) return;
+    if (typing || event.defaultPrevented || !action) return;
     event.preventDefault();
     action();
   });

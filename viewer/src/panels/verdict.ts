@@ -3,9 +3,9 @@ import type { Vector } from "../connection/protocol";
 import { part, write } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { asksNothing, bodyOf, fieldsBefore, isObject, kindOf, scaled } from "../store/draft";
+import type { Values } from "../form/schema";
+import { asksNothing, isDivisible, isObject, sameFields, wholeOf } from "../store/draft";
 import type { State } from "../store/state";
-import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../store/verdict";
 import type { Line } from "../store/verdict";
@@ -15,7 +15,7 @@ export class VerdictPanel {
   /** The part of the whole amount up to which the forecast has let it pass. */
   private limit = 1;
   /** The whole amount that `limit` is of. */
-  private whole: unknown = null;
+  private whole: Values | null = null;
 
   /** `show` takes the camera to a place. `focusProblem` puts the focus where something is wrong. */
   constructor(
@@ -100,12 +100,11 @@ export class VerdictPanel {
 
   private showAmount(state: State): void {
     const { amount } = state.draft;
-    const whole = amount?.whole ?? bodyOf(state.draft);
-    if (JSON.stringify(whole) !== JSON.stringify(this.whole)) this.limit = 1;
+    const whole = wholeOf(state);
+    if (this.whole === null || !sameFields(whole, this.whole)) this.limit = 1;
     this.whole = whole;
     this.limit = Math.min(this.limit, this.allowed(state));
-    const kind = kindOf(state, state.draft.key);
-    const shown = kind !== null && (amount !== null || state.draft.updating !== null || !asksNothing(state)) && state.draft.problems.length === 0 && !sameJson(scaled(kind.field, whole, 0.5, fieldsBefore(state)), whole);
+    const shown = (amount !== null || state.draft.updating !== null || !asksNothing(state)) && state.draft.problems.length === 0 && isDivisible(state);
     part("amount-row").hidden = !shown;
     const fraction = amount?.fraction ?? 1;
     // Rounded down, so that what is shown is no more than what passes.

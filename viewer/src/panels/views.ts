@@ -1,6 +1,7 @@
 /** The views that the simulation streams: which are seen, how opaque, and which one is being changed. */
 import type { ViewInformation } from "../connection/protocol";
 import { element, identifier, write } from "../dom";
+import { own } from "../own";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
@@ -37,11 +38,11 @@ export class ViewList {
   private show(): void {
     const { looks, chosenView, coarser } = this.store.state;
     for (const row of this.root.querySelectorAll<HTMLElement>("[data-view]")) {
-      const times = coarser[row.dataset.view ?? ""] ?? 1;
+      const times = own(coarser, row.dataset.view ?? "") ?? 1;
       const precision = row.querySelector<HTMLElement>(".precision")!;
       precision.hidden = times <= 1;
       write(precision, times <= 1 ? "" : `slow connection: values within ${times} times the error`);
-      const look = looks[row.dataset.view ?? ""];
+      const look = own(looks, row.dataset.view ?? "");
       if (!look) continue;
       row.querySelector<HTMLInputElement>('input[type="checkbox"]')!.checked = look.visible;
       const opacity = row.querySelector<HTMLInputElement>('input[type="range"]')!;

@@ -3,7 +3,6 @@ import type { DataFrame, TopologyFrame } from "../connection/protocol";
 import type { Action } from "../store/actions";
 import { appliedOrders, isShapeUnderWay } from "../store/orders";
 import type { State } from "../store/state";
-import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 
 export interface Content { topology: TopologyFrame; frame: DataFrame }
@@ -21,12 +20,14 @@ export class Earlier {
   /** `views` are those that are there; `changed` is called when another moment is kept. */
   constructor(store: Store<State, Action>, private readonly views: () => Iterable<Shown>, private readonly changed: () => void) {
     store.watch((state) => isShapeUnderWay(state.orders), (isUnderWay) => { if (isUnderWay) this.begun = this.now(); });
-    let known = appliedOrders(store.state.orders).length;
-    store.watch((state) => appliedOrders(state.orders), (orders) => {
+    let known = appliedOrders(store.state).length;
+    store.watch(appliedOrders, (orders) => {
       const newest = orders.at(-1);
       if (orders.length > known && newest && this.begun && this.begun.size > 0) this.keep(this.begun, `before “${newest.label}”`);
+      // In a recording one may go back: an order that is of the future now began at another moment.
+      else if (orders.length < known && !isShapeUnderWay(store.state.orders)) this.begun = null;
       known = orders.length;
-    }, sameJson);
+    });
   }
 
   get moment(): Moment {

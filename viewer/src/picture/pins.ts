@@ -1,4 +1,5 @@
 /** Pinned probes: places of the mesh whose value is plotted over time, and marked in the picture. */
+import type { Vector } from "../connection/protocol";
 import type { History } from "../history/series";
 import { seriesKey } from "../history/series";
 import type { Marks } from "./marks";
@@ -7,7 +8,15 @@ import type { Probe, ProbeReading } from "./probe";
 /** The most pins at once. */
 const PINS = 8;
 
-interface Pin { name: string; probe: Probe; series: Set<string> }
+/** `point` is where it was last, and `sought` the topology in which it was looked for last. */
+interface Pin { name: string; probe: Probe; point: Vector | null; sought: string | null; series: Set<string> }
+
+/** What pins need of the picture. */
+export interface PinSource {
+  read(probe: Probe): ProbeReading | null;
+  near(view: string, point: Vector): Probe | null;
+  topologyOf(view: string): string | null | undefined;
+}
 
 export class Pins {
   private pins: Pin[] = [];
@@ -15,13 +24,13 @@ export class Pins {
 
   /** `describe` names the field that a reading is of, and its unit. */
   constructor(
-    private readonly history: History, private readonly marks: Marks, private readonly read: (probe: Probe) => ProbeReading | null,
+    private readonly history: History, private readonly marks: Pick<Marks, "set">, private readonly source: PinSource,
     private readonly describe: (reading: ProbeReading) => { name: string; unit: string | null }, private readonly chosen: (key: string) => void,
   ) {}
 
   /** Pins a place, and has it plotted. The oldest goes where there are too many. */
   add(probe: Probe): void {
-    const pin = { name: `probe ${++this.count}`, probe, series: new Set<string>() };
+    const pin: Pin = { name: `probe ${++this.count}`, probe, point: null, sought: null, series: new Set() };
     if (this.pins.length >= PINS) this.remove(this.pins[0]!);
     this.pins.push(pin);
     this.update();
@@ -36,8 +45,13 @@ export class Pins {
   update(): boolean {
     let taken = false;
     const marks = this.pins.flatMap((pin) => {
-      const reading = this.read(pin.probe);
-      if (!reading) return [];
+      const reading = this.read(pin);
+      if (!reading) {
+        // Without values nobody can say yet whether it is there.
+        const isGone = this.source.topologyOf(pin.probe.view) !== null;
+        return pin.point ? [{ points: [pin.point], label: isGone ? `${pin.name}: the place is gone` : pin.name, kind: "probe" as const }] : [];
+      }
+      pin.point = reading.point;
       if (reading.field !== null) {
         const { name, unit } = this.describe(reading);
         // Of another field: another source, so that both may have the same cycles.
@@ -54,6 +68,16 @@ export class Pins {
     });
     this.marks.set("pins", marks);
     return taken;
+  }
+
+  /** What is read at a pin. In another topology its triangle is another one: the place is found anew, once for each topology. */
+  private read(pin: Pin): ProbeReading | null {
+    const topology = this.source.topologyOf(pin.probe.view) ?? null;
+    if (topology !== null && topology !== pin.probe.topology && topology !== pin.sought && pin.point) {
+      pin.sought = topology;
+      pin.probe = this.source.near(pin.probe.view, pin.point) ?? pin.probe;
+    }
+    return this.source.read(pin.probe);
   }
 
   private remove(pin: Pin): void {

@@ -2,9 +2,10 @@
 import type { DataFrame, TopologyFrame, Vector } from "../connection/protocol";
 import { digits } from "../number";
 import type { Look } from "../store/looks";
+import { nearestPoint, nearestTriangle } from "./nearest";
 
-/** A place in a view: a point in one of its triangles, by the weights of the corners. It goes where they go. */
-export interface Probe { view: string; triangle: number; weights: Vector }
+/** A place in a view: a point in one of the triangles of a topology, by the weights of the corners. It goes where they go. */
+export interface Probe { view: string; topology: string; triangle: number; weights: Vector }
 
 /** `value` is that of the field that colours the view; null where none does, or its value is not finite. */
 export interface ProbeReading { point: Vector; feature: number | null; field: string | null; component: number; value: number | null; cycle: number; time: number }
@@ -29,7 +30,9 @@ export function cornersOf(triangle: number, topology: TopologyFrame, points: Flo
   return { indices, places: indices.map((index) => [0, 1, 2].map((k) => points[3 * index + k]!) as Vector) as [Vector, Vector, Vector] };
 }
 
-export function readProbe({ triangle, weights: at }: Probe, topology: TopologyFrame, frame: DataFrame, { field: name, component }: Pick<Look, "field" | "component">): ProbeReading | null {
+/** What a view has at a place; null where it has other triangles than those that the place is in one of. */
+export function readProbe({ topology: own, triangle, weights: at }: Probe, topology: TopologyFrame, frame: DataFrame, { field: name, component }: Pick<Look, "field" | "component">): ProbeReading | null {
+  if (topology.topology !== own) return null;
   const corners = cornersOf(triangle, topology, frame.points);
   if (!corners) return null;
   const point = [0, 1, 2].map((k) => corners.places.reduce((sum, place, corner) => sum + at[corner]! * place[k]!, 0)) as Vector;
@@ -44,6 +47,16 @@ export function readProbe({ triangle, weights: at }: Probe, topology: TopologyFr
   }
   const feature = topology.triangleFeatures?.[triangle] ?? null;
   return { point, feature, field: field?.name ?? null, component, value, cycle: frame.cycle, time: frame.time };
+}
+
+/** The place of a view that is nearest to a point; null where it is farther away than its triangle is long. */
+export function probeNear(view: string, point: Vector, topology: TopologyFrame, points: Float32Array): Probe | null {
+  const { triangle, distance } = nearestTriangle(point, topology.triangles, points);
+  const corners = cornersOf(triangle, topology, points);
+  if (!corners) return null;
+  const [a, b, c] = corners.places;
+  const size = Math.max(...([[a, b], [b, c], [c, a]] as const).map(([p, q]) => Math.hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2])));
+  return distance <= size ? { view, topology: topology.topology, triangle, weights: weights(nearestPoint(point, corners.places), corners.places) } : null;
 }
 
 /** A reading in two lines: the value, and the place. */

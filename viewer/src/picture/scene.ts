@@ -14,10 +14,11 @@ import { Camera } from "./camera";
 import type { Box } from "./camera";
 import { mouse } from "./mouse";
 import { Pace } from "./pace";
-import { cornersOf, readProbe, weights } from "./probe";
+import { cornersOf, probeNear, readProbe, weights } from "./probe";
 import type { Probe, ProbeReading } from "./probe";
 import { Ranges } from "./ranges";
 import type { Range } from "./ranges";
+import { own } from "../own";
 import { colourKey } from "../store/looks";
 import type { Look, Looks } from "../store/looks";
 import { THEMES } from "./theme";
@@ -161,7 +162,7 @@ export class Scene {
       this.pending.delete(name);
     }
     for (const { name, kind } of views) {
-      const look = looks[name];
+      const look = own(looks, name);
       if (!look) continue;
       const known = this.layers.get(name);
       const layer = known ?? new Layer(name, kind, look, this.renderer);
@@ -289,11 +290,25 @@ export class Scene {
   /** The place under a place of the page: of what carries colours, where anything does. */
   probe(clientX: number, clientY: number): Probe | null {
     const hit = this.hit(clientX, clientY, (layer) => layer.coloured !== null) ?? this.hit(clientX, clientY, () => true);
-    const corners = hit?.layer.topology && cornersOf(hit.triangle, hit.layer.topology, hit.layer.coordinates);
-    return hit && corners ? { view: hit.layer.name, triangle: hit.triangle, weights: weights(hit.point, corners.places) } : null;
+    const { topology, frame, name } = hit?.layer ?? {};
+    // Values of a new topology may be on their way: what is drawn until then is in other triangles.
+    const corners = hit && topology && frame && cornersOf(hit.triangle, topology, frame.points);
+    return corners ? { view: name!, topology: topology.topology, triangle: hit.triangle, weights: weights(hit.point, corners.places) } : null;
   }
 
-  /** What a view has at a place now; null where the view is no more, or has no such triangle. */
+  /** The topology that a view is drawn with; null as long as it has no values, undefined where there is no such view. */
+  topologyOf(view: string): string | null | undefined {
+    const layer = this.layers.get(view);
+    return layer && (layer.frame ? layer.topology?.topology ?? null : null);
+  }
+
+  /** The place of a view that is nearest to a point; null where it has none near it. */
+  near(view: string, point: Vector): Probe | null {
+    const layer = this.layers.get(view);
+    return layer?.topology && layer.frame ? probeNear(view, point, layer.topology, layer.frame.points) : null;
+  }
+
+  /** What a view has at a place now; null where the view is no more, or has other triangles. */
   read(probe: Probe): ProbeReading | null {
     const layer = this.layers.get(probe.view);
     return layer?.topology && layer.frame ? readProbe(probe, layer.topology, layer.frame, layer.look) : null;

@@ -1,5 +1,6 @@
 /** What may be written at a place of a pipeline: the keys and values of the schema, and names that the run knows. */
 import type { Json } from "../connection/protocol";
+import { own } from "../own";
 import { written } from "./formula";
 import type { Path, Place } from "./place";
 
@@ -43,7 +44,7 @@ export function nameKind(path: Path): NameKind | null {
   if (key === "name" && above === "set") return "parameter";
   if (key === "name" && above === "field") return "field";
   if (key === "names" && above === "features") return "feature";
-  return key === undefined ? null : NAMES[key] ?? null;
+  return key === undefined ? null : own(NAMES, key) ?? null;
 }
 
 /** All schemas that a value may keep to: references followed, alternatives taken apart. */

@@ -14,6 +14,8 @@ export type Action =
   | { type: "hello"; hello: Hello }
   /** All edits that make the shape, and how many orders can be taken back. */
   | { type: "stack"; edits: Json[]; undoable: number | undefined }
+  /** The stack is another one, whose edits are being fetched. */
+  | { type: "stack awaited"; undoable: number | undefined }
   /** The values of a view are within so many times the error that was asked for. */
   | { type: "precision"; view: string; coarser: number }
   | { type: "status"; status: Status; at: number }

@@ -2,6 +2,7 @@
 import type { ClientMessage, Json } from "../connection/protocol";
 import type { Action } from "./actions";
 import { missing, wishedOrder } from "./draft";
+import { whyNotEditable } from "./edits";
 import type { State } from "./state";
 import { sameJson } from "./store";
 import type { Store } from "./store";
@@ -42,14 +43,16 @@ export class Commands {
     return "";
   }
 
+  /** Takes the last order back. What an undo leaves is remembered when it is sent: so the stack must be known, and no order on its way. */
   undo(): void {
-    this.order({ undo: 1 });
+    if (whyNotEditable(this.store.state) === "") this.order({ undo: 1 });
   }
 
   /** Brings back the stack that the last undo left. */
   redo(): void {
-    const stack = this.store.state.undone.at(-1);
-    if (stack && !sameJson(stack, this.store.state.hello?.stack)) this.order({ stack });
+    const { state } = this.store;
+    const stack = state.undone.at(-1);
+    if (stack && whyNotEditable(state) === "" && !sameJson(stack, state.hello?.stack)) this.order({ stack });
   }
 
   /** Replaces the whole stack. */

@@ -2,6 +2,7 @@
 import type { Json } from "../connection/protocol";
 import { ROLES } from "../form/schema";
 import type { EditKind, Field, Property, Values } from "../form/schema";
+import { own } from "../own";
 import type { Draft, Part, State } from "./state";
 import { derived, sameJson } from "./store";
 
@@ -28,7 +29,7 @@ const propertiesOf = (kind: EditKind): Property[] => (kind.field.kind === "objec
 
 /** The features that play a part, in the order of the mesh. */
 export function chosen(state: Pick<State, "hello" | "selection">, part: Part): string[] {
-  return (state.hello?.features ?? []).map((feature) => feature.name).filter((name) => state.selection.parts[name] === part);
+  return (state.hello?.features ?? []).map((feature) => feature.name).filter((name) => own(state.selection.parts, name) === part);
 }
 
 /** Why what stands in the form is no edit yet, in words; empty where it is one. */
@@ -58,7 +59,7 @@ export function composedEdit(state: State): Json | null {
 }
 
 /** Whether what stands in the form asks for nothing: every amount is neutral, and there is nothing wrong to be mended. */
-export function asksNothing(state: State): boolean {
+export const asksNothing: (state: State) => boolean = derived(composing, (state) => {
   const { draft } = state;
   const kind = kindOf(state, draft.key);
   if (!kind) return true;
@@ -70,7 +71,7 @@ export function asksNothing(state: State): boolean {
   }
   const body = bodyOf(draft);
   return sameJson(sorted(amountsOf(kind.field, body)), sorted(amountsOf(kind.field, kind.neutral)));
-}
+});
 
 /** Whether two edits of a kind ask for the same, what they leave out counted as what it begins with. */
 function sameEdit(kind: EditKind, a: Json, b: Json): boolean {
@@ -119,6 +120,22 @@ export function scaled(field: Field, values: Values, fraction: number, before: V
   return result;
 }
 
+/** Whether fields are the same. What is not another one is not looked at: a region may hold very many faces. */
+export function sameFields(a: Values, b: Values): boolean {
+  const names = Object.keys(a);
+  return a === b || (names.length === Object.keys(b).length && names.every((name) => Object.hasOwn(b, name) && sameJson(a[name], b[name])));
+}
+
+/** What stands in the form at its full amount. */
+export const wholeOf = ({ draft }: Pick<State, "draft">): Values => draft.amount?.whole ?? bodyOf(draft);
+
+/** Whether a part of what stands in the form is something else than all of it. */
+export const isDivisible: (state: State) => boolean = derived(composing, (state) => {
+  const kind = kindOf(state, state.draft.key);
+  const whole = wholeOf(state);
+  return kind !== null && !sameFields(scaled(kind.field, whole, 0.5, fieldsBefore(state)), whole);
+});
+
 /** What of an entry is no amount: which one it is. */
 function fixedPart(field: Field & { kind: "object" }, entry: Values): Values {
   return Object.fromEntries(field.properties.flatMap(({ name, neutral }) => (neutral === undefined && entry[name] !== undefined ? [[name, entry[name]]] : [])));
@@ -132,12 +149,12 @@ export function fieldsBefore(state: Pick<State, "hello" | "draft" | "form">): Va
   const { key, updating, amount } = state.draft;
   const [kind, edit] = [kindOf(state, key), updating === null ? null : partsOf(state.hello?.stack[updating])];
   if (!kind || edit?.key !== key) return {};
-  const isUnchanged = sameEdit(kind, { [kind.key]: own(amount?.whole ?? bodyOf(state.draft)) }, { [kind.key]: own(edit.body) });
+  const isUnchanged = sameEdit(kind, { [kind.key]: withoutRoles(amount?.whole ?? bodyOf(state.draft)) }, { [kind.key]: withoutRoles(edit.body) });
   return isUnchanged ? {} : withoutShorthand(kind, edit.body);
 }
 
 /** The fields of an edit without its features, which are the selection. */
-const own = (body: Values): Values => Object.fromEntries(Object.entries(body).filter(([name]) => ROLES[name] === undefined));
+const withoutRoles = (body: Values): Values => Object.fromEntries(Object.entries(body).filter(([name]) => ROLES[name] === undefined));
 
 function between(neutral: Json, value: Json, fraction: number): Json {
   // What is typed has few digits, and so has a part of it.
@@ -193,7 +210,7 @@ export function openBoundariesMoved(state: State): { name: string; condition: st
   const { preview, hello } = state;
   if (preview.state !== "shown" || !preview.size) return [];
   return (hello?.features ?? []).flatMap(({ name, condition }) => {
-    const by = preview.moved[name] ?? 0;
+    const by = own(preview.moved, name) ?? 0;
     const part = by / preview.size!;
     return (condition === "inflow" || condition === "outflow") && part > OPEN_BOUNDARY_MOTION ? [{ name, condition, by, part }] : [];
   });

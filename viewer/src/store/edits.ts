@@ -44,7 +44,9 @@ export const isCancellable = ({ status }: OrderRecord): boolean => status === "a
 export function whyNotEditable(state: State): string {
   const why = whyNotSteering(state);
   if (why !== "") return why;
-  // The new stack is made of the one that is known: an edit that is on its way is not in it.
+  // The new stack is made of the one that is known: an edit that is on its way is not in it. What a connection that has just come back
+  // has to tell is not known yet.
+  if (state.connection.fresh || state.hello?.isAwaitingEdits) return "The edits are being loaded.";
   return state.orders.some((order) => isPending(order) && order.status !== "applying") ? "An order is under way: wait for it, or cancel it." : "";
 }
 

@@ -1,5 +1,6 @@
 /** How each view looks: whether it is seen, and what its colours stand for. */
 import type { FieldInformation, ViewInformation } from "../connection/protocol";
+import { own } from "../own";
 import { COLOUR_MAPS } from "../picture/colour";
 import type { RangeChoice } from "../picture/ranges";
 
@@ -35,7 +36,7 @@ export function firstLook(view: ViewInformation, views: readonly ViewInformation
 
 /** The looks of the views that there are now: those that are new look as they do at first, the others as they did. */
 export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks): Looks {
-  return Object.fromEntries(views.map((view) => [view.name, before[view.name] ?? firstLook(view, views, fields)]));
+  return Object.fromEntries(views.map((view) => [view.name, own(before, view.name) ?? firstLook(view, views, fields)]));
 }
 
 /** The looks with some of one view's, or of all, another. */

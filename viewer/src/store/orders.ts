@@ -1,7 +1,8 @@
 /** The orders that are known of: what each asked for, and what became of it. */
 import type { Json, OrderStatus } from "../connection/protocol";
 import { describeOrder } from "../form/describe";
-import type { OrderRecord } from "./state";
+import type { OrderRecord, State } from "./state";
+import { derived } from "./store";
 
 const LONGEST_LIST = 200;
 
@@ -39,6 +40,13 @@ export function ordersReconciled(orders: readonly OrderRecord[], statuses: reado
 /** Whether the shape is on its way to another: an order is being computed or carried out. */
 export const isShapeUnderWay = (orders: readonly OrderRecord[]): boolean => orders.some(({ status }) => status === "computing" || status === "applying");
 
-/** When orders began to change the shape, and what they asked for. */
-export const appliedOrders = (orders: readonly OrderRecord[]): { cycle: number; label: string }[] =>
-  orders.flatMap(({ cycle_applied, text }) => (typeof cycle_applied === "number" ? [{ cycle: cycle_applied, label: text }] : []));
+/** An order that has changed the shape: when it began to, and what it asked for. */
+export interface AppliedOrder { cycle: number; label: string }
+
+let applied: readonly AppliedOrder[] = [];
+/** The orders that have changed the shape: the same list as long as there is no other in it, so that it costs nothing to watch. */
+export const appliedOrders: (state: Pick<State, "orders">) => readonly AppliedOrder[] = derived(({ orders }) => [orders], ({ orders }) => {
+  const found = orders.flatMap(({ cycle_applied, text }) => (typeof cycle_applied === "number" ? [{ cycle: cycle_applied, label: text }] : []));
+  const isSame = found.length === applied.length && found.every(({ cycle, label }, i) => cycle === applied[i]!.cycle && label === applied[i]!.label);
+  return isSame ? applied : (applied = found);
+});

@@ -77,14 +77,24 @@ export function lineBetween(from: Vector, to: Vector): Pipeline {
   return { name: LINE, every: { steps: 5 }, stages: [{ probe: { line: { from, to, count: LINE_POINTS } } }, { stream: {} }] };
 }
 
+/** The line that a stage takes, by its ends. */
+function lineIn(stage: Json): (Body & { from: Vector; to: Vector }) | null {
+  const line = body(body(stage, "probe"), "line");
+  return line && isVector(line.from) && isVector(line.to) ? { ...line, from: line.from, to: line.to } : null;
+}
+
 /** The ends of a pipeline's line; null where it takes none. */
 export function lineOf(pipeline: Pipeline | undefined): { from: Vector; to: Vector } | null {
-  for (const stage of pipeline?.stages ?? []) {
-    const line = body(stage, "probe")?.line;
-    const { from, to } = (typeof line === "object" && line !== null && !Array.isArray(line) ? line : {}) as { from?: Json; to?: Json };
-    if (isVector(from) && isVector(to)) return { from, to };
-  }
-  return null;
+  const line = pipeline?.stages.map(lineIn).find((found) => found !== null);
+  return line ? { from: line.from, to: line.to } : null;
+}
+
+/** The pipeline with its line between two other points; all else stays, for it may be one that somebody wrote. */
+export function withLine(pipeline: Pipeline, from: Vector, to: Vector): Pipeline {
+  const at = pipeline.stages.findIndex((stage) => lineIn(stage) !== null);
+  const stage = pipeline.stages[at];
+  if (stage === undefined) return pipeline;
+  return { ...pipeline, stages: pipeline.stages.with(at, { ...(stage as Body), probe: { ...body(stage, "probe"), line: { ...lineIn(stage), from, to } } }) };
 }
 
 const SOURCES = ["surface", "slice", "contour", "threshold", "clip", "probe", "streamlines", "glyphs"];

@@ -3,6 +3,7 @@ import type { Hello, Json } from "../connection/protocol";
 import { describeOrder } from "../form/describe";
 import { ROLES } from "../form/schema";
 import type { Values } from "../form/schema";
+import { own } from "../own";
 import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
@@ -41,6 +42,7 @@ function after(state: State, action: Action): State {
     }
     case "hello": return withHello(state, action.hello);
     case "stack": return withStack(state, action.edits, action.undoable);
+    case "stack awaited": return state.hello ? { ...state, hello: { ...state.hello, isAwaitingEdits: true, undoable: action.undoable } } : state;
     case "precision": return { ...state, coarser: { ...state.coarser, [action.view]: action.coarser } };
     case "status": {
       const { status, at } = action;
@@ -108,25 +110,30 @@ function after(state: State, action: Action): State {
   }
 }
 
-function withFrame({ count, cycle: newest, views }: Frames, view: string, cycle: number): Frames {
-  const before = views[view];
+function withFrame({ count, views: known }: Frames, view: string, cycle: number): Frames {
+  const before = own(known, view);
+  // A view that goes back does so with all others: what these have shown is of the future.
+  const views = before && cycle < before.cycle ? {} : known;
   const gap = before && cycle > before.cycle ? cycle - before.cycle : null;
   const gaps = gap === null ? before?.gaps ?? [] : [...before!.gaps, gap].slice(-LONGEST_GAPS);
-  return { count: count + 1, cycle: Math.max(newest ?? cycle, cycle), views: { ...views, [view]: { cycle, gaps } } };
+  const next = { ...views, [view]: { cycle, gaps } };
+  return { count: count + 1, cycle: Math.max(...Object.values(next).map((shown) => shown.cycle)), views: next };
 }
 
 function withHello(state: State, hello: Hello): State {
   const names = new Set(hello.features.map((feature) => feature.name));
   const before = new Set(state.hello?.features.map((feature) => feature.name));
-  const parts = Object.fromEntries(Object.entries(state.selection.parts).filter(([name]) => names.has(name)));
+  const known = Object.fromEntries(Object.entries(state.selection.parts).filter(([name]) => names.has(name)));
   // What flows in and out stays where it is, unless somebody wants otherwise.
-  for (const name of openBoundaries({ hello })) if (!before.has(name) && parts[name] === undefined) parts[name] = "fixed";
+  const open = openBoundaries({ hello }).filter((name) => !before.has(name) && !Object.hasOwn(known, name));
+  const parts: State["selection"]["parts"] = { ...known, ...Object.fromEntries(open.map((name) => [name, "fixed" as const])) };
   const { hovered } = state.selection;
   const next: State = {
     ...state, hello, ...viewsOf(state, hello),
     connection: { ...state.connection, known: true, fresh: false },
     selection: { parts: sameJson(parts, state.selection.parts) ? state.selection.parts : parts, hovered: hovered !== null && names.has(hovered) ? hovered : null },
-    orders: ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
+    // Each hello of a recording has all orders of its moment: what is known beside them is of another one.
+    orders: hello.recording ? ordersReconciled([], hello.orders, false) : ordersReconciled(state.orders, hello.orders, state.connection.fresh && state.connection.known),
     askedBy: hello.role === "driver" ? state.askedBy : null,
     following: hello.role !== "driver" && state.following,
     followedBy: hello.role === "driver" ? state.followedBy : 0,
@@ -138,7 +145,7 @@ function withHello(state: State, hello: Hello): State {
 }
 
 function withStack(state: State, edits: Json[], undoable: number | undefined): State {
-  return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, undoable } }) : state;
+  return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, isAwaitingEdits: false, undoable } }) : state;
 }
 
 /** The next state, in which an edit that is not there any more is not changed any more. */
@@ -150,8 +157,8 @@ function withoutLostEdit(state: State, next: State): State {
 
 function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
   const looks = looksOf(views, fields, state.looks);
-  const known = state.chosenView !== null && looks[state.chosenView] !== undefined;
-  const coloured = views.find((view) => looks[view.name]?.field != null) ?? views[0];
+  const known = state.chosenView !== null && Object.hasOwn(looks, state.chosenView);
+  const coloured = views.find((view) => own(looks, view.name)?.field != null) ?? views[0];
   return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known ? state.chosenView : coloured?.name ?? null };
 }
 
@@ -174,7 +181,7 @@ function withOrderSent(state: State, id: string, order: Json, at: number): State
 }
 
 function withPart(parts: State["selection"]["parts"], feature: string, part: Part | null): State["selection"]["parts"] {
-  if ((parts[feature] ?? null) === part) return parts;
+  if ((own(parts, feature) ?? null) === part) return parts;
   const { [feature]: _, ...rest } = parts;
   return part === null ? rest : { ...rest, [feature]: part };
 }
@@ -217,15 +224,15 @@ function withEditLoaded(state: State, index: number): State {
   const loaded = partsOf(state.hello?.stack[index]);
   const kind = kindOf(state, loaded?.key ?? null);
   if (!loaded || !kind) return state;
-  const own = Object.fromEntries(Object.entries(withoutShorthand(kind, loaded.body)).filter(([name, value]) => ROLES[name] === undefined && value !== null));
-  const parts: Record<string, Part> = {};
+  const fields = Object.fromEntries(Object.entries(withoutShorthand(kind, loaded.body)).filter(([name, value]) => ROLES[name] === undefined && value !== null));
+  const parts = new Map<string, Part>();
   for (const [name, part] of Object.entries(ROLES)) {
     const names = loaded.body[name];
-    if (Array.isArray(names)) for (const feature of names) if (typeof feature === "string" && parts[feature] === undefined) parts[feature] = part;
+    if (Array.isArray(names)) for (const feature of names) if (typeof feature === "string" && !parts.has(feature)) parts.set(feature, part);
   }
   const before = cleared(state);
-  const draft = { ...before.draft, key: kind.key, bodies: { ...before.draft.bodies, [kind.key]: { ...kind.neutral, ...own } }, updating: index };
-  return { ...before, draft, selection: { ...state.selection, parts } };
+  const draft = { ...before.draft, key: kind.key, bodies: { ...before.draft.bodies, [kind.key]: { ...kind.neutral, ...fields } }, updating: index };
+  return { ...before, draft, selection: { ...state.selection, parts: Object.fromEntries(parts) } };
 }
 
 function withAmount(state: State, fraction: number): State {

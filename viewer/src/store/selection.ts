@@ -1,4 +1,5 @@
 /** Which features are handles and which are held fixed, as the picture asks for it; the state of it is in the store. */
+import { own } from "../own";
 import type { Action } from "./actions";
 import { chosen } from "./draft";
 import type { Part, State } from "./state";
@@ -17,7 +18,7 @@ export class Selection {
   }
 
   get(feature: string): Part | null {
-    return this.store.state.selection.parts[feature] ?? null;
+    return own(this.store.state.selection.parts, feature) ?? null;
   }
 
   /** The features that play a part, in the order of `names`, or of the mesh. */

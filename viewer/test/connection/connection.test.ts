@@ -156,6 +156,26 @@ describe("a connection", () => {
     expect(addresses).toHaveLength(3);
   });
 
+  it("is one, however often somebody tries again", async () => {
+    const { connection, sockets, states, timers } = setUp();
+    sockets[0]!.open();
+    sockets[0]!.end(4001);
+    await settle();
+    connection.retry();
+    connection.retry();
+    expect(sockets.map(({ readyState }) => readyState)).toEqual([3, 3, 0]);
+    sockets[2]!.open();
+    await settle();
+    expect([states.at(-1)![0], timers.length]).toEqual(["connected", 0]);
+    // One that fails while another was begun meanwhile has nothing to say.
+    sockets[2]!.end(4001);
+    connection.retry();
+    sockets[3]!.end(1006);
+    connection.retry();
+    await settle();
+    expect([sockets.length, timers.length]).toEqual([5, 0]);
+  });
+
   it("says when nothing could be sent, and sends JSON when it could", () => {
     const { connection, sockets } = setUp();
     expect(connection.send({ pause: {} })).toBe(false);

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Decoder } from "../../src/connection/decoder";
+import { Decoder, MOST_WAITING } from "../../src/connection/decoder";
 import type { DecodeWorker } from "../../src/connection/decoder";
 import type { DataFrame, Frame } from "../../src/connection/protocol";
 
@@ -37,6 +37,18 @@ describe("the queue in front of the decoder", () => {
     while (waiting.length) work();
     expect(lost).toEqual(["broken"]);
     expect(counts).toEqual([1]);
+  });
+
+  it("does not let frames pile up where none is decoded, and says so", () => {
+    const { decoder, lost, waiting } = setUp();
+    // Only how long it is counts.
+    const large = { byteLength: MOST_WAITING / 4 } as ArrayBuffer;
+    for (let pushed = 0; pushed < 5; pushed++) decoder.push(large);
+    expect(lost).toEqual([]);
+    decoder.push(large);
+    expect(lost).toEqual(["more than 512 MiB of frames wait to be decoded"]);
+    for (let pushed = 0; pushed < 4; pushed++) decoder.push(large);
+    expect([lost.length, waiting.length]).toEqual([1, 1]);
   });
 
   it("forgets what an ended connection left behind, and counts from the start", () => {

@@ -17,8 +17,12 @@ function setUp() {
     probe: async () => null, setTimer: (action) => timers.push(action), clearTimer: () => undefined, random: () => 0.5,
   });
   const heard: string[] = [];
+  const explained: string[] = [];
   const listen = (): void => stream.listen({
-    state: (state) => heard.push(state), message: ({ kind }) => heard.push(kind), alive: () => heard.push("alive"),
+    state: (state, explanation) => {
+      heard.push(state);
+      if (explanation !== "") explained.push(explanation);
+    }, message: ({ kind }) => heard.push(kind), alive: () => heard.push("alive"),
     frame: (frame) => heard.push(`frame ${frame.kind === "data" ? frame.cycle : "topology"}`), trouble: (text) => heard.push(text),
   });
   const decode = (): void => {
@@ -29,7 +33,7 @@ function setUp() {
   const acknowledged = (): number[] => sockets.at(-1)!.sent.map((sent) => Number((sent as BigUint64Array)[0]));
   stream.connection.start();
   sockets[0]!.onopen!();
-  return { stream, sockets, heard, listen, decode, bring, acknowledged };
+  return { stream, sockets, heard, explained, waiting, listen, decode, bring, acknowledged };
 }
 
 describe("the stream", () => {
@@ -46,6 +50,20 @@ describe("the stream", () => {
     decode();
     expect(heard.slice(5)).toEqual(["alive", "frame 3"]);
     expect(acknowledged()).toEqual([2, 3]);
+  });
+
+  it("ends with a word where nothing can be decoded, and takes no more frames", () => {
+    const { stream, sockets, heard, explained, waiting, listen, bring } = setUp();
+    bring(1);
+    stream.fail("the geometry kernel did not arrive: 503 Service Unavailable");
+    listen();
+    expect(heard).toEqual(["connected", "alive", "dismissed"]);
+    expect(explained).toEqual(["This page cannot show the simulation: the geometry kernel did not arrive: 503 Service Unavailable. Reload the page."]);
+    stream.connection.retry();
+    sockets.at(-1)!.onopen!();
+    bring(2, 3);
+    expect([sockets.length, waiting.length, heard.slice(3)]).toEqual([2, 1, ["connected", "alive", "dismissed"]]);
+    expect(explained[1]).toBe(explained[0]);
   });
 
   it("acknowledges nothing of a connection that is gone", async () => {

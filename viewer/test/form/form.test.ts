@@ -53,6 +53,20 @@ describe("the form", () => {
     });
   });
 
+  it("keeps a setting that cannot be sent as it was, says what is wrong, and shows it again", () => {
+    tick("throat: handle");
+    const steps = root.querySelector<HTMLInputElement>('details.schedule input[aria-label="schedule steps"]')!;
+    type(steps, "50");
+    type(input("factors z"), "0.5");
+    type(steps, "");
+    expect([wishedOrder(store.state), missing(store.state)]).toEqual([null, "schedule steps is empty"]);
+    expect([steps.value, steps.getAttribute("aria-invalid")]).toEqual(["", "true"]);
+    store.dispatch({ type: "composed", key: "translate", values: { by: [0, 0, 1] }, step: "handle 1" });
+    expect(wishedOrder(store.state)).toMatchObject({ schedule: { steps: 50, every: { steps: 5 } } });
+    expect([steps.value, steps.getAttribute("aria-invalid")]).toEqual(["50", null]);
+    expect(root.querySelector("details.schedule summary")!.textContent).toBe("50 shapes over 250 steps");
+  });
+
   it("needs a handle, and numbers", () => {
     type(input("factors z"), "0.5");
     expect(missing(store.state)).toMatch(/at least one feature/);

@@ -33,6 +33,27 @@ describe("the history", () => {
     expect(history.series.length).toBe(SERIES);
   });
 
+  it("has room for new monitors where others are no more", () => {
+    const history = new History();
+    const keys = Array.from({ length: SERIES }, (_, i) => seriesKey(`s${i}`, "p"));
+    history.keep(keys);
+    for (let i = 0; i < SERIES; i++) history.add(`s${i}`, 0, 0, { p: 1 });
+    history.add("new", 1, 1, { p: 2, q: 3 });
+    expect(history.series.some(({ source }) => source === "new")).toBe(false);
+    history.keep(keys.slice(2));
+    expect(history.series.length).toBe(SERIES);
+    history.add("new", 2, 2, { p: 2, q: 3, r: 4 });
+    expect(history.series.length).toBe(SERIES);
+    expect(history.series.slice(-2).map(({ key }) => key)).toEqual([seriesKey("new", "p"), seriesKey("new", "q")]);
+    expect(history.series.some(({ source }) => source === "s0" || source === "s1")).toBe(false);
+    expect(history.at(seriesKey("new", "q"), 2)).toBe(3);
+    // One that has come back has its place again.
+    history.keep(keys.slice(3));
+    history.keep(keys.slice(2));
+    history.add("new", 3, 3, { p: 2, q: 3, r: 4 });
+    expect(history.series.some(({ source }) => source === "s2")).toBe(true);
+  });
+
   it("is written as a table, with what has commas quoted", () => {
     const history = new History();
     history.add('a,"b"', 1, 0.5, { p: 2, q: NaN });

@@ -70,6 +70,53 @@ describe("the list of edits", () => {
     expect(made.orders()).toEqual([{ stack: [stack[0], stack[1], shift(3, { name: "push" })] }]);
   });
 
+  it("leaves a name that is being typed alone while orders go on", () => {
+    const applying = (shape: number): void => made.store.dispatch({ type: "order", status: { id: "o1", status: "applying", shape, shapes: 10, order: { edits: [shift(3)] } } });
+    applying(1);
+    button(0, "rename").click();
+    const input = document.querySelector<HTMLInputElement>("#stack input")!;
+    expect(document.activeElement).toBe(input);
+    input.value = "thr";
+    applying(2);
+    expect(document.querySelector("#pending .detail")!.textContent).toBe("shape 2 of 10");
+    expect([document.querySelector("#stack input"), input.value, document.activeElement]).toEqual([input, "thr", input]);
+    expect(made.orders()).toEqual([]);
+    input.value = "throat";
+    input.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    expect(made.orders()).toEqual([{ stack: [shift(1, { name: "throat" }), stack[1], stack[2]] }]);
+    expect(document.querySelector("#stack input")).toBeNull();
+  });
+
+  it("gives no name to another edit than the one that was meant, nor while edits are on their way", () => {
+    const typed = (change: () => void): void => {
+      button(0, "rename").click();
+      const input = document.querySelector<HTMLInputElement>("#stack input")!;
+      input.value = "push";
+      change();
+      input.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    };
+    typed(() => made.store.dispatch({ type: "stack", edits: [shift(7), stack[0]!], undoable: 2 }));
+    expect(made.orders()).toEqual([]);
+    expect(made.store.state.refusal).toBe("The edit was not renamed. The edits have changed meanwhile.");
+    expect(rows()).toEqual(["Wall: moved by 7 along x", "Wall: moved by 1 along x"]);
+    typed(() => made.store.dispatch({ type: "stack awaited", undoable: 3 }));
+    expect(made.orders()).toEqual([]);
+    expect(made.store.state.refusal).toBe("The edit was not renamed. The edits are being loaded.");
+  });
+
+  it("changes nothing, and takes nothing back, until all edits are here", () => {
+    made.store.dispatch({ type: "stack awaited", undoable: 4 });
+    expect([button(0, "mute").getAttribute("aria-disabled"), button(0, "mute").title]).toEqual(["true", "The edits are being loaded."]);
+    const undo = document.querySelector<HTMLButtonElement>("#undo")!;
+    expect([undo.disabled, undo.title]).toEqual([true, "The edits are being loaded."]);
+    for (const act of ["mute", "remove"]) button(0, act).click();
+    button(2, "load").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", altKey: true }));
+    expect(made.orders()).toEqual([]);
+    made.store.dispatch({ type: "stack", edits: [...stack, shift(4)], undoable: 4 });
+    button(0, "remove").click();
+    expect(made.orders()).toEqual([{ stack: [stack[1], stack[2], shift(4)] }]);
+  });
+
   it("shows what is on its way with a way to take it back, and what was refused until it is dismissed", () => {
     const order = (status: "computing" | "applying" | "rejected", more: object = {}): void => made.store.dispatch({ type: "order", status: { id: "o1", status, order: { edits: [shift(9)] }, ...more } });
     order("computing");

@@ -48,6 +48,72 @@ describe("the parameters", () => {
     expect(input().value).toBe("1");
   });
 
+  const reconnect = (value: number): void => {
+    made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    made.store.dispatch({ type: "connection", state: "connected", explanation: "" });
+    made.greet({ parameters: [inflow(value)] });
+  };
+
+  it("show what the run has where an answer was lost with the connection, and say so", () => {
+    set("12");
+    reconnect(10);
+    expect([input().value, wrong().textContent]).toEqual(["10", "The connection was lost before 12 was confirmed; the run has 10."]);
+    expect(panel.refused(String(made.sent[0]!.id), "no")).toBe(false);
+    // The run had it all the same.
+    made.greet({ parameters: [inflow(12)] });
+    expect([input().value, wrong().hidden]).toEqual(["12", true]);
+    set("13");
+    reconnect(13);
+    expect([input().value, wrong().hidden]).toEqual(["13", true]);
+  });
+
+  it("say nothing of a connection that was lost after the answer", () => {
+    set("12");
+    made.greet({ parameters: [inflow(12)] });
+    panel.done(String(made.sent[0]!.id));
+    reconnect(10);
+    expect([input().value, wrong().hidden]).toEqual(["10", true]);
+    set("10");
+    panel.done(String(made.sent[1]!.id));
+    reconnect(11);
+    expect([input().value, wrong().hidden]).toEqual(["11", true]);
+  });
+
+  it("show what the run has once the focus has left them", () => {
+    input().focus();
+    made.greet({ parameters: [inflow(14)] });
+    expect(input().value).toBe("10");
+    input().blur();
+    expect(input().value).toBe("14");
+    // What is on its way stays, and so does what is wrong, beside the reason.
+    input().focus();
+    set("15");
+    input().blur();
+    expect(input().value).toBe("15");
+    input().focus();
+    set("30");
+    input().blur();
+    expect([input().value, wrong().hidden]).toEqual(["30", false]);
+  });
+
+  it("show what another viewer has set while one's own message was on its way", () => {
+    input().focus();
+    set("12");
+    made.greet({ parameters: [inflow(14)] });
+    input().blur();
+    expect(input().value).toBe("12");
+    panel.done(String(made.sent[0]!.id));
+    expect(input().value).toBe("14");
+  });
+
+  it("leave one alone that is on its way, where another is changed", () => {
+    const other = (value: number) => ({ name: "other", value });
+    made.greet({ parameters: [inflow(10), other(1)] });
+    set("12");
+    made.greet({ parameters: [inflow(10), other(2)] });
+    expect(input().value).toBe("12");
+  });
+
   it("are off for a watcher, with the reason", () => {
     made.greet({ role: "watcher", may_drive: false });
     expect([input().disabled, input().title]).toEqual([true, "This link is for watching only."]);

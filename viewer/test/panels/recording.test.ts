@@ -1,8 +1,9 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
 import { parseServerMessage } from "../../src/connection/protocol";
-import type { Played } from "../../src/connection/protocol";
+import type { OrderStatus, Played } from "../../src/connection/protocol";
 import { RecordingPanel } from "../../src/panels/recording";
+import { appliedOrders, isShapeUnderWay } from "../../src/store/orders";
 import { whyNotSteering } from "../../src/store/run";
 import { page } from "../page";
 import { openDocument } from "./document";
@@ -59,6 +60,32 @@ describe("the slider of a recording", () => {
     speed.value = "16";
     speed.dispatchEvent(new Event("change"));
     expect(made.sent.at(-1)).toMatchObject({ play: { speed: 16 } });
+  });
+
+  it("shows the speed at which it goes on, also after the connection came back", () => {
+    const speed = document.querySelector<HTMLSelectElement>("#speed")!;
+    made.greet({ recording });
+    speed.value = "4";
+    speed.dispatchEvent(new Event("change"));
+    made.store.dispatch({ type: "played", played: played({ speed: 4 }) });
+    expect(speed.value).toBe("4");
+    made.store.dispatch({ type: "played", played: played({ speed: 1 }) });
+    expect(speed.value).toBe("1");
+  });
+
+  it("leaves nothing of the future where it goes back", () => {
+    const order = (id: string, status: "applied" | "applying", cycle: number): OrderStatus => ({ id, status, cycle_applied: cycle, order: { undo: 1 } });
+    const done = order("o1", "applied", 5);
+    made.greet({ recording, orders: [done] });
+    for (const view of ["a", "b"]) made.store.dispatch({ type: "frame", view, cycle: 500 });
+    made.store.dispatch({ type: "order", status: order("o2", "applying", 490) });
+    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state).map(({ cycle }) => cycle)]).toEqual([true, [5, 490]]);
+    made.greet({ recording, orders: [done] });
+    expect([isShapeUnderWay(made.store.state.orders), appliedOrders(made.store.state).map(({ cycle }) => cycle)]).toEqual([false, [5]]);
+    made.store.dispatch({ type: "frame", view: "a", cycle: 10 });
+    expect(made.store.state.frames).toMatchObject({ count: 3, cycle: 10 });
+    made.store.dispatch({ type: "frame", view: "b", cycle: 8 });
+    expect(made.store.state.frames.cycle).toBe(10);
   });
 
   it("is told by a message of its own", () => {

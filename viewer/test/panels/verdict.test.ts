@@ -59,6 +59,18 @@ describe("the foot of the form", () => {
     expect(z()).toBe(0.9);
   });
 
+  it("does not look through the faces of a region at what is nothing to it", () => {
+    let looked = 0;
+    const faces = Object.assign([1, 2, 3], { toJSON: () => { looked++; return [1, 2, 3]; } });
+    made.store.dispatch({ type: "composed", key: "translate", values: { region: { faces }, by: [0, 0, 1] }, step: "drag 1" });
+    expect(at("amount-row").hidden).toBe(false);
+    const before = looked;
+    for (let cycle = 0; cycle < 5; cycle++) made.store.dispatch({ type: "frame", view: "v", cycle });
+    expect(looked - before).toBe(0);
+    made.store.dispatch({ type: "amount", fraction: 0.5 });
+    expect([bodyOf(made.store.state.draft).by, at("amount-text").textContent, at("amount-row").hidden]).toEqual([[0, 0, 0.5], "50 %", false]);
+  });
+
   it("takes Cancel for asking for nothing", () => {
     at("cancel").click();
     expect(wishedOrder(made.store.state)).toBeNull();

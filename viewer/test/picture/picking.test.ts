@@ -44,5 +44,6 @@ describe("numbers", () => {
   });
   it("are read back", () => {
     expect([" 1.5 ", "−2", "1,5", ".5", "1e-3", "x", "", "1e999"].map(readNumber)).toEqual([1.5, -2, 1.5, 0.5, 0.001, null, null, null]);
+    for (const value of [-2.5e-6, -5e-4, 3e-6, -1.25e7, -0.005]) expect(readNumber(digits(value)), digits(value)).toBe(value);
   });
 });

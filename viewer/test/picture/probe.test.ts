@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { DataFrame, TopologyFrame } from "../../src/connection/protocol";
-import { readProbe, weights } from "../../src/picture/probe";
+import { probeNear, readProbe, weights } from "../../src/picture/probe";
 
 const topology: TopologyFrame = {
   kind: "topology", view: "v", topology: "1", points: 4, triangles: Uint32Array.from([0, 1, 2, 1, 3, 2]), triangleFeatures: Uint32Array.from([4, 5]), lines: new Uint32Array(0),
@@ -13,7 +13,7 @@ const frame: DataFrame = {
     { name: "q", association: "element", components: 1, values: Float32Array.from([0.25, NaN]) },
   ],
 };
-const read = (field: string | null, triangle = 0, component = -1) => readProbe({ view: "v", triangle, weights: [0.25, 0.25, 0.5] }, topology, frame, { field, component });
+const read = (field: string | null, triangle = 0, component = -1) => readProbe({ view: "v", topology: "1", triangle, weights: [0.25, 0.25, 0.5] }, topology, frame, { field, component });
 
 describe("a probe", () => {
   it("reads linear fields exactly, vectors by magnitude or component, cells as they are", () => {
@@ -26,6 +26,17 @@ describe("a probe", () => {
     expect(read("q", 1)).toMatchObject({ value: null, feature: 5 });
     expect(read("missing")).toMatchObject({ value: null, field: null });
     expect(read("x", 2)).toBeNull();
+    expect(readProbe({ view: "v", topology: "2", triangle: 0, weights: [1, 0, 0] }, topology, frame, { field: "x", component: -1 })).toBeNull();
+  });
+  it("is found in other triangles at the one that is nearest, where that is near", () => {
+    const other = { ...topology, topology: "2", triangles: Uint32Array.from([1, 3, 2, 0, 1, 2]) };
+    const found = probeNear("v", [0.5, 0.5, 0.1], other, frame.points)!;
+    expect(found).toMatchObject({ view: "v", topology: "2", triangle: 1 });
+    expect(readProbe(found, other, frame, { field: "x", component: -1 })).toMatchObject({ point: [0.5, 0.5, 0], value: 0.5 });
+    const beside = probeNear("v", [-1, 1, 0], other, frame.points)!;
+    expect(readProbe(beside, other, frame, { field: "x", component: -1 })!.point).toEqual([0, 1, 0]);
+    expect(probeNear("v", [0.5, 0.5, 3], other, frame.points)).toBeNull();
+    expect(probeNear("v", [0, 0, 0], { ...other, triangles: new Uint32Array(0) }, frame.points)).toBeNull();
   });
   it("weighs corners so that they give the point back", () => {
     const corners: [[number, number, number], [number, number, number], [number, number, number]] = [[1, 0, 2], [3, 1, 0], [0, 5, 1]];

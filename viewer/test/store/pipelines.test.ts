@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { Pipelines } from "../../src/connection/pipelines";
 import type { ClientMessage, Json, TopologyFrame } from "../../src/connection/protocol";
 import { worstOf } from "../../src/picture/worst";
-import { QUALITY, WORST, atOffset, extent, offsetOf, planeOf, readPipelines, withPlane, withQuality, worstCells } from "../../src/store/pipelines";
+import { QUALITY, WORST, atOffset, extent, lineOf, offsetOf, planeOf, readPipelines, withLine, withPlane, withQuality, worstCells } from "../../src/store/pipelines";
 import type { Pipeline } from "../../src/store/pipelines";
 
 const cut: Pipeline = { name: "cut", every: { steps: 5 }, stages: [{ slice: { origin: [1, 2, 3], normal: [0, 2, 0] } }, { select: { fields: ["p"] } }, { stream: {} }] };
@@ -43,6 +43,14 @@ describe("changes of pipelines", () => {
     pipelines.answered("m2");
     pipelines.remove("cut");
     expect(sent[2]).toEqual({ pipelines: { remove: ["cut"] } });
+  });
+
+  it("moves a line, and keeps what somebody has written around it", () => {
+    const own: Pipeline = { name: "line", every: { steps: 50 }, stages: [{ select: { fields: ["p"] } }, { probe: { line: { from: [0, 0, 0], to: [1, 0, 0], count: 1001 } } }, { csv: { file: "line.csv" } }] };
+    const moved = withLine(own, [0, 1, 0], [2, 0, 0]);
+    expect(moved).toEqual({ ...own, stages: [own.stages[0], { probe: { line: { from: [0, 1, 0], to: [2, 0, 0], count: 1001 } } }, own.stages[2]] });
+    expect(lineOf(moved)).toEqual({ from: [0, 1, 0], to: [2, 0, 0] });
+    expect([lineOf(cut), withLine(cut, [0, 0, 0], [1, 1, 1])]).toEqual([null, cut]);
   });
 
   it("finds the worst cells of a view", () => {

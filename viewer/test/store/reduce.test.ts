@@ -1,8 +1,11 @@
 import { describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
+import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { appliedOrders } from "../../src/store/orders";
 import { runState, slowLink, whyNotSteering } from "../../src/store/run";
+import { Selection } from "../../src/store/selection";
 import { NO_PREVIEW } from "../../src/store/state";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../../src/store/verdict";
 import { STATUS, feature, page } from "../page";
@@ -162,6 +165,44 @@ describe("an earlier edit", () => {
   });
 });
 
+describe("orders that have changed the shape", () => {
+  it("are the same list as long as there is no other in it", () => {
+    const { store } = page();
+    const tell = (id: string, status: "applying" | "applied", shape: number, cycle: number): void => store.dispatch({ type: "order", status: { id, status, shape, shapes: 2, cycle_applied: cycle, order: { edits: [pinch(0.5)] } } });
+    tell("a", "applying", 1, 5);
+    const list = appliedOrders(store.state);
+    expect(list).toEqual([{ cycle: 5, label: "Throat: height × 0.5" }]);
+    tell("a", "applied", 2, 5);
+    store.dispatch({ type: "frame", view: "v", cycle: 6 });
+    expect(appliedOrders(store.state)).toBe(list);
+    tell("b", "applying", 1, 9);
+    expect(appliedOrders(store.state).map(({ cycle }) => cycle)).toEqual([5, 9]);
+  });
+});
+
+describe("names that every object inherits", () => {
+  const NAMES = ["constructor", "toString", "valueOf", "__proto__"];
+
+  it("are views like others", () => {
+    const { store, greet } = page();
+    greet({ views: NAMES.map((name) => ({ name, kind: "slice" })), fields: [{ name: "p", association: "vertex", components: 1 }] });
+    for (const name of NAMES) expect(own(store.state.looks, name), name).toMatchObject({ visible: true, field: "p" });
+    for (const view of NAMES) store.dispatch({ type: "frame", view, cycle: 7 });
+    expect(store.state.frames).toMatchObject({ count: 4, cycle: 7 });
+    expect(store.state.chosenView).toBe("constructor");
+  });
+
+  it("are features like others", () => {
+    const { store, greet } = page();
+    greet({ features: NAMES.map((name) => feature(name, name === "valueOf" ? null : "inflow")) });
+    expect(chosen(store.state, "fixed")).toEqual(NAMES.filter((name) => name !== "valueOf"));
+    const selection = new Selection(store);
+    expect(selection.get("valueOf")).toBeNull();
+    selection.toggle("valueOf", "handle");
+    expect(chosen(store.state, "handle")).toEqual(["valueOf"]);
+  });
+});
+
 describe("taking back", () => {
   it("is offered only where there is something", () => {
     const { store } = page();
@@ -173,15 +214,64 @@ describe("taking back", () => {
   it("of an undo brings the same stack back", () => {
     const { store, commands, greet, orders } = page({ stack: [pinch(0.5)] });
     expect(isRedoable(store.state)).toBe(false);
+    const applied = (): void => store.dispatch({ type: "order", status: { id: store.state.orders.at(-1)!.id, status: "applied" } });
     commands.undo();
+    applied();
     greet({ stack: [] });
     expect(isRedoable(store.state)).toBe(true);
     commands.redo();
     expect(orders()).toEqual([{ undo: 1 }, { stack: [pinch(0.5)] }]);
+    applied();
     greet({ stack: [pinch(0.5)] });
     expect(isRedoable(store.state)).toBe(false);
     commands.redo();
     expect(orders()).toHaveLength(2);
+  });
+
+  it("waits for an order that is on its way, so that each is brought back by itself", () => {
+    const { store, commands, orders } = page({ stack: [pinch(0.5), pinch(0.6)], undoable: 2 });
+    const begun = (edits: Json[]): void => {
+      store.dispatch({ type: "order", status: { id: store.state.orders.at(-1)!.id, status: "applying" } });
+      store.dispatch({ type: "stack", edits, undoable: edits.length });
+    };
+    commands.undo();
+    commands.undo();
+    expect(orders()).toEqual([{ undo: 1 }]);
+    begun([pinch(0.5)]);
+    commands.undo();
+    begun([]);
+    commands.redo();
+    expect(orders().at(-1)).toEqual({ stack: [pinch(0.5)] });
+    begun([pinch(0.5)]);
+    // Nor is an order taken back before it has changed the stack: nobody could bring it back.
+    commands.order({ edits: [pinch(0.7)] });
+    commands.undo();
+    commands.redo();
+    expect(orders().at(-1)).toEqual({ edits: [pinch(0.7)] });
+    begun([pinch(0.5), pinch(0.7)]);
+    commands.undo();
+    begun([pinch(0.5)]);
+    expect(isRedoable(store.state)).toBe(true);
+  });
+
+  it("waits for the edits of a stack that is another one, and of a connection that has come back", () => {
+    const { store, commands, greet, sent } = page({ stack: [pinch(0.5)] });
+    expect(whyNotEditable(store.state)).toBe("");
+    store.dispatch({ type: "stack awaited", undoable: 2 });
+    expect([whyNotEditable(store.state), undoable(store.state)]).toEqual(["The edits are being loaded.", 2]);
+    commands.undo();
+    store.dispatch({ type: "stack", edits: [pinch(0.5), pinch(0.6)], undoable: 2 });
+    expect(whyNotEditable(store.state)).toBe("");
+    store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    store.dispatch({ type: "connection", state: "connected", explanation: "" });
+    expect(whyNotEditable(store.state)).toBe("The edits are being loaded.");
+    commands.undo();
+    greet({ stack: [pinch(0.5)], isAwaitingEdits: true });
+    expect(whyNotEditable(store.state)).toBe("The edits are being loaded.");
+    store.dispatch({ type: "edit loaded", index: 0 });
+    store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.4] }, step: "typed" });
+    expect(applyButton(store.state)).toMatchObject({ label: "Update edit 1", why: "The edits are being loaded." });
+    expect(sent).toEqual([]);
   });
 
   it("does not go over what another has ordered meanwhile", () => {

@@ -1,0 +1,34 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import { MonitorPanel } from "../../src/panels/monitors";
+import { openDocument } from "./document";
+
+describe("the newest values of monitors", () => {
+  let panel: MonitorPanel;
+  const told = (pipeline: string, ...names: string[]): void => panel.update({ pipeline, cycle: 1, values: Object.fromEntries(names.map((name, i) => [name, i])) });
+  const shown = (): string[] => [...document.querySelectorAll("#monitors .monitor")].map(({ textContent }) => textContent);
+  beforeEach(() => {
+    openDocument();
+    panel = new MonitorPanel(document.getElementById("monitors")!);
+  });
+
+  it("go with their monitors", () => {
+    told("health", "quality.min", "mass");
+    expect([shown(), document.getElementById("monitors-panel")!.hidden]).toEqual([["quality.min0", "mass1"], false]);
+    panel.keep([{ pipeline: "health", name: "mass" }]);
+    expect(shown()).toEqual(["mass1"]);
+    panel.keep([]);
+    expect([shown(), document.getElementById("monitors-panel")!.hidden]).toEqual([[], true]);
+  });
+
+  it("are a hundred at most, and those stay up to date", () => {
+    const names = Array.from({ length: 100 }, (_, i) => `n${i}`);
+    told("a", ...names);
+    panel.update({ pipeline: "b", cycle: 2, values: { more: 1 } });
+    panel.update({ pipeline: "a", cycle: 2, values: { more: 1, n99: 5 } });
+    expect([shown().length, shown().at(-1)]).toEqual([100, "n995"]);
+    panel.keep(names.slice(1).map((name) => ({ pipeline: "a", name })));
+    told("b", "more");
+    expect(shown().at(-1)).toBe("more0");
+  });
+});
