@@ -1,6 +1,6 @@
 //! How many lines about viewers the journal gets.
 //!
-//! Whoever has a secret can connect as often as he likes. The journal is kept, and read again whole:
+//! Whoever has a secret can connect as often as they like. The journal is kept, and read again whole:
 //! it must not become longer by that without end.
 
 use std::{num::NonZeroU64, sync::Mutex};
