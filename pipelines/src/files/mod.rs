@@ -63,6 +63,7 @@ pub use model::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_v
 pub use pictures::{Database, write_picture};
 pub use vtk::{Compression, Series};
 pub use whole::write_durably;
+use whole::write_whole;
 
 use crate::extract::{Extract, Field};
 use error::Flaw;
@@ -187,11 +188,11 @@ pub fn write_compressed(
     let format = format(&data)?;
     let bytes = vtk::from_extract(extract, format, compression)
         .map_err(|error| Flaw::from(error).in_file(path))?;
-    write_atomically(&data, |file| file.write_all(&bytes))?;
+    write_whole(&data, |file| file.write_all(&bytes))?;
     match (index, piece) {
         (Some(index), Some(piece)) => {
             let text = index.text(&piece, extract);
-            write_atomically(path, |file| file.write_all(text.as_bytes()))
+            write_whole(path, |file| file.write_all(text.as_bytes()))
         }
         _ => Ok(()),
     }
@@ -214,7 +215,7 @@ pub fn write_mesh(
     let format = format(path)?;
     let bytes = vtk::from_mesh(mesh, fields, format, compression)
         .map_err(|error| Flaw::from(error).in_file(path))?;
-    write_atomically(path, |file| file.write_all(&bytes))
+    write_whole(path, |file| file.write_all(&bytes))
 }
 
 /// Whether [`write_mesh`] takes a mesh of these cells for a file of this name: for whoever wants to
@@ -240,12 +241,4 @@ fn format(path: &Path) -> Result<vtk::Format, FileError> {
             Err(unknown_extension(found, ".vtu, .vtp, .vtk, .vtpd, .pvtu and .pvtp").in_file(path))
         }
     }
-}
-
-/// Writes a file under another name beside it, then renames it.
-fn write_atomically(
-    path: &Path,
-    write: impl FnOnce(&mut std::fs::File) -> std::io::Result<()>,
-) -> Result<(), FileError> {
-    whole::write_whole(path, write).map_err(|error| Flaw::from(error).in_file(path))
 }

@@ -4,8 +4,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::error::{FileError, Flaw};
-use super::whole::write_longer;
-use super::write_atomically;
+use super::whole::{write_longer, write_whole};
 use crate::render::{Image, Picture};
 
 /// Writes a picture to a PNG file of 8 bits a channel.
@@ -15,7 +14,7 @@ use crate::render::{Image, Picture};
 pub fn write_picture(path: impl AsRef<Path>, image: &Image) -> Result<(), FileError> {
     let path = path.as_ref();
     let bytes = encode(image).map_err(|error| Flaw::from(error).in_file(path))?;
-    write_atomically(path, |file| file.write_all(&bytes))
+    write_whole(path, |file| file.write_all(&bytes))
 }
 
 /// The picture as the bytes of a PNG file.
@@ -61,7 +60,7 @@ impl Database {
     /// # Errors
     /// [`FileError`] where the table cannot be written.
     pub fn create(folder: &Path) -> Result<Self, FileError> {
-        write_atomically(&folder.join(TABLE), |file| file.write_all(HEAD.as_bytes()))?;
+        write_whole(&folder.join(TABLE), |file| file.write_all(HEAD.as_bytes()))?;
         Ok(Self { folder: folder.to_path_buf(), length: HEAD.len() as u64 })
     }
 
@@ -78,8 +77,7 @@ impl Database {
             angles.map_or([String::new(), String::new()], |them| them.map(|it| it.to_string()));
         let row = format!("{time},{cycle},{camera},{azimuth},{elevation},{name}\n");
         let table = self.folder.join(TABLE);
-        write_longer(&table, self.length, &row, "")
-            .map_err(|error| Flaw::from(error).in_file(&table))?;
+        write_longer(&table, self.length, &row, "")?;
         self.length += row.len() as u64;
         Ok(())
     }

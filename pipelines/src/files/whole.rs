@@ -5,18 +5,24 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read, Write};
 use std::path::Path;
 
+use super::error::{FileError, Flaw};
+
 /// Writes a file under another name beside it, then renames it. Folders that are missing are made.
 /// Several programs may do so at the same time.
 pub(super) fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
-) -> io::Result<()> {
-    if let Some(directory) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        std::fs::create_dir_all(directory)?;
-    }
-    write_beside(path, &format!(".{}.part", std::process::id()), write)
+) -> Result<(), FileError> {
+    let made = match path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        Some(directory) => std::fs::create_dir_all(directory),
+        None => Ok(()),
+    };
+    let ending = format!(".{}.part", std::process::id());
+    made.and_then(|()| write_beside(path, &ending, write))
+        .map_err(|error| Flaw::from(error).in_file(path))
 }
 
+/// Writes a file under its own name with a dot before and an ending behind it, then renames it.
 fn write_beside(
     path: &Path,
     ending: &str,
@@ -68,8 +74,13 @@ pub fn write_durably(
 }
 
 /// Writes a file anew with an entry behind its first `length` bytes and a tail behind that.
-pub(super) fn write_longer(path: &Path, length: u64, entry: &str, tail: &str) -> io::Result<()> {
-    let old = File::open(path)?;
+pub(super) fn write_longer(
+    path: &Path,
+    length: u64,
+    entry: &str,
+    tail: &str,
+) -> Result<(), FileError> {
+    let old = File::open(path).map_err(|error| Flaw::from(error).in_file(path))?;
     write_whole(path, |new| {
         let copied = io::copy(&mut old.take(length), new)?;
         if copied < length {

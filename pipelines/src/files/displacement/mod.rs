@@ -33,9 +33,7 @@ use tombolo_deform::mesh::{NumberType, Vector};
 use tombolo_deform::surface::Surface;
 
 use super::error::Flaw;
-use super::{
-    FileError, Problem, extension, parse_mesh, unknown_extension, write, write_atomically,
-};
+use super::{FileError, Problem, extension, parse_mesh, unknown_extension, write, write_whole};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
 
 mod matching;
@@ -133,7 +131,7 @@ pub fn write_displacement(
         return write(path, &to_extract(surface, displacement));
     }
     let text = to_text(surface, displacement, if extension(path) == "csv" { "," } else { " " });
-    write_atomically(path, |file| file.write_all(text.as_bytes()))
+    write_whole(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// Checks, before long work, whether [`write_displacement`] takes a file of this name.

@@ -3,9 +3,8 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::super::error::{FileError, Flaw};
-use super::super::whole::write_longer;
-use super::super::write_atomically;
+use super::super::error::FileError;
+use super::super::whole::{write_longer, write_whole};
 
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";
@@ -36,7 +35,7 @@ impl Series {
     /// # Errors
     /// [`FileError`] where the file cannot be written.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        write_atomically(path, |file| {
+        write_whole(path, |file| {
             file.write_all(HEAD.as_bytes())?;
             file.write_all(TAIL.as_bytes())
         })?;
@@ -54,7 +53,7 @@ impl Series {
         let directory = path.parent().unwrap_or(Path::new(""));
         let mut text = HEAD.to_owned();
         files.for_each(|(time, file)| text.push_str(&entry(directory, time, file)));
-        write_atomically(path, |new| {
+        write_whole(path, |new| {
             new.write_all(text.as_bytes())?;
             new.write_all(TAIL.as_bytes())
         })?;
@@ -75,8 +74,7 @@ impl Series {
     pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
         let entry = entry(directory, time, file);
-        write_longer(&self.path, self.length, &entry, TAIL)
-            .map_err(|error| Flaw::from(error).in_file(&self.path))?;
+        write_longer(&self.path, self.length, &entry, TAIL)?;
         self.length += entry.len() as u64;
         Ok(())
     }
