@@ -6,6 +6,7 @@ mod common;
 use std::{
     io::{Read, Write},
     net::TcpStream,
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -746,16 +747,17 @@ fn what_a_monitoring_system_asks_is_answered() {
     solver.finish();
 }
 
+/// A run whose journal is `run.jsonl` in a folder.
+fn journaled(directory: &Path) -> Solver {
+    let text =
+        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
+    Solver::new(Settings { config: config(&text), output: directory.into(), ..Settings::default() })
+}
+
 #[test]
 fn who_came_and_left_stands_in_the_journal() {
     let directory = tempfile::tempdir().unwrap();
-    let text =
-        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
-    let mut solver = Solver::new(Settings {
-        config: config(&text),
-        output: directory.path().into(),
-        ..Settings::default()
-    });
+    let mut solver = journaled(directory.path());
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
@@ -780,13 +782,7 @@ fn who_came_and_left_stands_in_the_journal() {
 #[test]
 fn one_who_watches_cannot_make_the_journal_grow_without_end() {
     let directory = tempfile::tempdir().unwrap();
-    let text =
-        LINK_TO_ALL.replacen("\"version\": 1,", "\"version\": 1, \"journal\": \"run.jsonl\",", 1);
-    let mut solver = Solver::new(Settings {
-        config: config(&text),
-        output: directory.path().into(),
-        ..Settings::default()
-    });
+    let mut solver = journaled(directory.path());
     solver.step();
     let link = solver.adaptor.watching_link().unwrap();
     let watching = link.replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);

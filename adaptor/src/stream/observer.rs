@@ -109,3 +109,24 @@ impl Hub {
         self.stack_of_edits().whole(change)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Map;
+
+    use super::*;
+
+    /// A recording begins with what the run is, also where it is begun before that is known.
+    #[test]
+    fn nothing_comes_before_the_run_is_described() {
+        let hub = Hub::default();
+        let early = Observer::of(&hub).unwrap();
+        hub.tell(|| json!({"pipelines": {}}));
+        assert!(early.next().is_none());
+        hub.describe(Map::new);
+        assert!(matches!(early.next(), Some(Observed::Hello)));
+        assert!(matches!(early.next(), Some(Observed::Text(_))));
+        let late = Observer::of(&hub).unwrap();
+        assert!(matches!(late.next(), Some(Observed::Hello)));
+    }
+}

@@ -232,6 +232,28 @@ fn a_start_of_another_length_is_refused_whatever_follows() {
     }
 }
 
+/// What is improved must not fall below the guard's floor where the solve's shape keeps to it.
+#[test]
+fn an_improved_shape_gives_way_where_it_is_below_the_floor() {
+    let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    let shaper = alone(&mesh);
+    let middle = mesh.points().iter().position(|point| *point == [0.5; 3]).unwrap();
+    let with_middle = |x: f64| {
+        let mut points = mesh.points().to_vec();
+        points[middle][0] = x;
+        points
+    };
+    let guard = Guard { min_scaled_jacobian: 0.1, ..Guard::default() };
+    let (sound, poor, poorer) = (with_middle(0.5), with_middle(0.96), with_middle(0.98));
+    let least = |points: &[Vector]| quality(mesh.cells(), points).min;
+    assert!(least(&sound) > 0.1 && least(&poor) < 0.1 && least(&poorer) > 0.0);
+    assert!(shaper.may_replace(&sound, &poor, &guard));
+    assert!(!shaper.may_replace(&poor, &sound, &guard));
+    // Neither keeps to it: the improver has the last word, unless it has turned a cell inside out.
+    assert!(shaper.may_replace(&poor, &poorer, &guard));
+    assert!(!shaper.may_replace(&with_middle(1.1), &poor, &guard));
+}
+
 /// Quality does not depend on how the mesh is divided.
 #[test]
 fn quality_is_that_of_one_process() {
