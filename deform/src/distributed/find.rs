@@ -145,9 +145,8 @@ fn held(part: &Part, dimension: usize) -> Vec<Held> {
     held
 }
 
-/// For each vertex whether no cell has it and others without a cell lie where it does: the end of
-/// an array that is longer than what is used of it. Nobody can tell which of them is meant, and
-/// nobody asks.
+/// For each vertex whether it is one of several that lie at one point and belong to no cell, as at
+/// the end of an array that is longer than what is used of it. Such a vertex is shared with nobody.
 fn spare(part: &Part) -> Vec<bool> {
     let used = marks(part.points.len(), part.cells.connectivity());
     let mut unused: Vec<([u64; 3], usize)> = (0..part.points.len())

@@ -58,20 +58,21 @@ pub(super) enum Held {
 /// A vertex and what this rank has around it.
 pub(super) type Candidate = (u32, Held);
 
-/// The bits of a vertex in a message; what is held stands above.
-const VERTEX: u32 = (1 << 30) - 1;
-
-fn packed((vertex, held): Candidate) -> u32 {
-    vertex | (held as u32) << 30
+fn write(message: &mut Writer, (vertex, held): Candidate) {
+    message.u32(vertex);
+    message.u8(held as u8);
 }
 
-fn unpacked(rank: usize, packed: u32) -> Twin {
-    let held = match packed >> 30 {
+/// Reads a vertex of a rank, as [`write`] has written it.
+fn read(rank: u32, reader: &mut Reader) -> Result<Twin, DistributedError> {
+    let vertex = reader.u32()?;
+    let held = match reader.u8()? {
         0 => Held::Whole,
         1 => Held::Lower,
-        _ => Held::Nothing,
+        2 => Held::Nothing,
+        _ => return Err(reader.garbled().into()),
     };
-    Twin { rank: index(rank), vertex: packed & VERTEX, held }
+    Ok(Twin { rank, vertex, held })
 }
 
 /// Vertices of one global number. Collective; what is wrong on this rank alone is not agreed upon
@@ -87,13 +88,13 @@ pub(super) fn by_number(
         let number = numbers[candidate.0 as usize];
         let message = &mut messages[dealt_to(number, size)];
         message.u64(number);
-        message.u32(packed(candidate));
+        write(message, candidate);
     }
     let mut told = Vec::new();
     for (rank, bytes) in communicator.exchange(addressed(messages)) {
         let mut reader = Reader::new(rank, &bytes);
         while !reader.is_empty() {
-            told.push(Told { name: reader.u64()?, twin: unpacked(rank, reader.u32()?) });
+            told.push(Told { name: reader.u64()?, twin: read(index(rank), &mut reader)? });
         }
     }
     told.sort_unstable_by_key(|told| (told.name, told.twin));
@@ -186,7 +187,7 @@ pub(super) fn by_position(
         for (copy, &position) in boxes.iter().enumerate() {
             let message = &mut messages[dealt_to(name(position), size)];
             message.u64(name(position) << 1 | u64::from(copy > 0));
-            message.u32(packed((vertex, held)));
+            write(message, (vertex, held));
             message.f64s(&point);
         }
     }
@@ -200,9 +201,9 @@ pub(super) fn by_position(
     for (rank, bytes) in communicator.exchange(addressed(messages)) {
         let mut reader = Reader::new(rank, &bytes);
         while !reader.is_empty() {
-            let (tagged, vertex) = (reader.u64()?, reader.u32()?);
+            let (tagged, twin) = (reader.u64()?, read(index(rank), &mut reader)?);
             let (of_box, is_copy, point) = (tagged >> 1, tagged & 1 == 1, reader.vector()?);
-            told.push(Placed { of_box, point, is_copy, twin: unpacked(rank, vertex) });
+            told.push(Placed { of_box, point, is_copy, twin });
         }
     }
     told.sort_unstable_by(|a, b| {
@@ -300,7 +301,7 @@ fn answer<'a>(message: &mut Writer, of: Twin, others: impl Iterator<Item = &'a T
     message.u32(index(others.clone().count()));
     for other in others {
         message.u32(other.rank);
-        message.u32(packed((other.vertex, other.held)));
+        write(message, (other.vertex, other.held));
     }
 }
 
@@ -313,7 +314,7 @@ fn heard(answers: Vec<Message>) -> Result<Twins, DistributedError> {
             let others: Result<Vec<Twin>, DistributedError> = (0..count)
                 .map(|_| {
                     let rank = reader.u32()?;
-                    Ok(unpacked(rank as usize, reader.u32()?))
+                    read(rank, &mut reader)
                 })
                 .collect();
             twins.push((vertex, others?));
