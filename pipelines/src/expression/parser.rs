@@ -16,6 +16,11 @@ pub(super) enum Kind {
     Condition,
 }
 
+/// The column of a byte of a text, from 1.
+fn column(text: &str, at: usize) -> usize {
+    text.get(..at).map_or(0, |before| before.chars().count()) + 1
+}
+
 /// The operations of a formula whose value is of this kind.
 pub(super) fn parse(
     text: &str,
@@ -107,13 +112,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The column of a byte of the text, from 1.
-    fn column(&self, at: usize) -> usize {
-        self.text.get(..at).map_or(0, |before| before.chars().count()) + 1
-    }
-
     fn error(&self, at: usize, message: String) -> ExpressionError {
-        ExpressionError { column: self.column(at), message, suggestion: None }
+        ExpressionError { column: column(self.text, at), message, suggestion: None }
     }
 
     fn require(&self, found: Kind, expected: Kind, at: usize) -> Result<(), ExpressionError> {
@@ -287,12 +287,11 @@ impl<'a> Parser<'a> {
             self.push(Operation::Value(index), 0, start)?;
         } else if name == "pi" {
             self.push(Operation::Constant(std::f64::consts::PI), 0, start)?;
-        } else if let Some(mut found) = self.found_names.take() {
+        } else if let Some(found) = &mut self.found_names {
             let index = found.iter().position(|known| known.name == name).unwrap_or_else(|| {
-                found.push(UsedName { name: name.to_owned(), column: self.column(start) });
+                found.push(UsedName { name: name.to_owned(), column: column(self.text, start) });
                 found.len() - 1
             });
-            self.found_names = Some(found);
             self.push(Operation::Value(index), 0, start)?;
         } else {
             let known =

@@ -70,7 +70,8 @@ impl From<&SphereRegion> for Function {
     }
 }
 
-fn unit(direction: Vector) -> Vector {
+/// The vector of length 1 along a direction that has a length, however small or large.
+pub(crate) fn unit(direction: Vector) -> Vector {
     let length = direction.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
     direction.map(|x| x / length)
 }

@@ -34,6 +34,7 @@ pub use check::{ChannelError, check_field_length, check_names};
 pub(crate) use decimate::Decimation;
 pub use error::ExtractError;
 pub(crate) use error::unknown_field;
+pub(crate) use function::unit;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
 pub use pattern::{Input, Kept};

@@ -388,7 +388,7 @@ pub(super) fn pattern(
     let mut fastest = [speeds.filter(|speed| speed.is_finite()).fold(0.0, f64::max)];
     communicator.reduce(Reduction::Maximum, &mut fastest);
     let settings = Settings {
-        max_length: stage.max_length.unwrap_or(5.0 * length(bounds.extent())),
+        max_length: stage.max_length.unwrap_or(5.0 * bounds.diagonal()),
         max_steps: u32::try_from(stage.max_steps).unwrap_or(u32::MAX),
         error: stage.error,
         least_speed: 1e-12 * fastest[0],

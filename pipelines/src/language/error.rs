@@ -1,6 +1,7 @@
 //! Errors that point at their token.
 
 use std::collections::HashSet;
+use std::hash::Hash;
 use std::ops::Range;
 
 use serde_path_to_error::Segment;
@@ -205,10 +206,10 @@ pub(super) fn finite(value: f64) -> Result<(), Problem> {
     }
 }
 
-/// Refuses a list in which a name stands twice; `what` are those that are named.
-pub(super) fn none_twice(names: &[String], what: &str) -> Result<(), Problem> {
+/// Refuses a list in which something stands twice; `what` says what is listed.
+pub(super) fn none_twice<T: Eq + Hash>(list: &[T], what: &str) -> Result<(), Problem> {
     let mut before = HashSet::new();
-    match names.iter().position(|name| !before.insert(name)) {
+    match list.iter().position(|item| !before.insert(item)) {
         Some(index) => Err(Problem::new(format!("found the same {what} twice")).at(index)),
         None => Ok(()),
     }

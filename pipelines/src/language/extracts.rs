@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::edit::{BoxRegion, SphereRegion};
 use tombolo_deform::mesh::Vector;
-use tombolo_deform::vector::length;
 
 use super::Problem;
 use super::error::finite;
@@ -342,7 +341,8 @@ pub(super) fn check_point(point: Vector, key: &str) -> Result<(), Problem> {
 }
 
 pub(super) fn check_direction(direction: Vector, key: &str) -> Result<(), Problem> {
-    if length(direction).is_normal() {
+    let length = direction.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
+    if length.is_normal() {
         return Ok(());
     }
     Err(Problem::new("expected a direction, whose length is not 0").within(key))

@@ -232,7 +232,7 @@ fn all_measures() -> Vec<Measure> {
 }
 
 /// A statistic of a value over time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Measure {
     /// The mean over time.
@@ -410,13 +410,7 @@ impl TimeStatistics {
         if self.measures.is_empty() {
             return Err(Problem::new("expected at least one measure").within("measures"));
         }
-        for (index, measure) in self.measures.iter().enumerate() {
-            if self.measures[..index].contains(measure) {
-                let problem = Problem::new("found the same measure twice");
-                return Err(problem.at(index).within("measures"));
-            }
-        }
-        Ok(())
+        none_twice(&self.measures, "measure").map_err(|problem| problem.within("measures"))
     }
 
     /// The names of the fields that it makes, with what each holds; none of a monitor.

@@ -5,11 +5,10 @@ use std::sync::Arc;
 use tombolo_deform::communicator::{Communicator, agree};
 use tombolo_deform::mesh::{ArrayView, Cells, Values, Vector};
 use tombolo_deform::names::nearest;
-use tombolo_deform::vector::{length, scale};
 
 use crate::extract::{
     Association, Channel, Extract, ExtractFeatures, Extracted, Field, FieldView, Source,
-    check_length, is_absent, merged, unknown_field,
+    check_length, is_absent, merged, unit, unknown_field,
 };
 use crate::language::{Slice, Stage};
 
@@ -105,9 +104,7 @@ impl<'a> Region<'a> {
     /// The direction across a slice by one plane.
     pub(super) fn across(&self) -> Option<Vector> {
         match self.stage {
-            Some(Stage::Slice(Slice::Plane(plane))) => {
-                Some(scale(plane.normal, 1.0 / length(plane.normal)))
-            }
+            Some(Stage::Slice(Slice::Plane(plane))) => Some(unit(plane.normal)),
             _ => None,
         }
     }
