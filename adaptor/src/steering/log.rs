@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
-/// What is told of a command whose turn comes in the run that goes on from the checkpoint.
+/// The reason told for a command that a run which goes on from the checkpoint carries out.
 const LEFT_OPEN: &str = "the run ended before its turn came; a run that goes on from its \
                          checkpoint carries it out";
 

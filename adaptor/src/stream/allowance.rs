@@ -16,7 +16,7 @@ pub(super) const WEIGHT: usize = 1 << 20;
 #[derive(Debug)]
 pub(super) struct Allowance {
     burst: f64,
-    /// What comes in, in messages a second.
+    /// How fast the bucket fills, in messages a second.
     rate: f64,
     left: f64,
     since: Instant,

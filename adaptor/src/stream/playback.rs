@@ -32,8 +32,9 @@ const UNDECODED: u64 = 8;
 const PATIENCE: Duration = Duration::from_secs(5);
 /// How fast a recording may be gone through.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.01..=1000.0;
-/// What a viewer has asked for that waits for its turn, and the errors that it has yet to be told.
+/// Requests of a viewer that may wait for their turn.
 const SAID: usize = 64;
+/// Errors that may wait for a viewer to read them.
 const ERRORS: usize = 16;
 /// Orders that a viewer is told of at once, the newest.
 const ORDERS: usize = 100;

@@ -28,7 +28,7 @@ impl ArrayView<'_> {
                 .find(|(_, _, value)| !value.is_finite())
         };
         if let Some(values) = self.contiguous() {
-            // Without a branch or a sum that has an order, so that many are looked at at a time.
+            // Neither a branch nor a sum in a certain order: processors check many numbers at once.
             let is_bad =
                 |chunk: &[f64]| chunk.iter().fold(false, |bad, value| bad | !value.is_finite());
             let chunk = values.chunks(CHUNK).position(is_bad)?;

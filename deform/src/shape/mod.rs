@@ -417,10 +417,10 @@ impl Shaper {
         Some(points.into())
     }
 
-    /// Whether an improved shape may stand for that of the solve: the guard lets it through, or
-    /// neither, and every cell stays valid on the straight way from the reference. What is lifted is
-    /// the part of its quality that a cell has kept: one that was poor in the reference may lose some
-    /// of it, and fall below the guard's floor.
+    /// Whether an improved shape may take the place of the solve's: the guard lets it through, or
+    /// lets neither through while every cell of the improved one stays valid on the straight way
+    /// from the reference. The improver lifts the part of its quality that each cell has kept. A
+    /// cell that was poor in the reference may lose some of it, and fall below the guard's floor.
     fn may_replace(&self, improved: &[Vector], points: &[Vector], guard: &Guard) -> bool {
         let valid = Guard { min_scaled_jacobian: 0.0, ..Guard::default() };
         let keeps =

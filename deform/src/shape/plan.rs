@@ -166,8 +166,9 @@ impl Plan {
         (before, (before + 1).min(self.shapes()), position - f64::from(before))
     }
 
-    /// The least and the mean scaled Jacobian at a shape of the way; between two shapes those of the
-    /// worse one, though the mesh may be worse there than at both. `None` at the start, and where the volume was not judged.
+    /// The least and the mean scaled Jacobian at a shape of the way. Between two shapes they are those
+    /// of the worse one, though the mesh may be worse there than at both. `None` at the start, and
+    /// where the volume was not judged.
     #[must_use]
     pub fn quality_at(&self, position: f64) -> Option<(f64, f64)> {
         let (before, after, fraction) = self.between(position);

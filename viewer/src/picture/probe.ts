@@ -30,7 +30,7 @@ export function cornersOf(triangle: number, topology: TopologyFrame, points: Flo
   return { indices, places: indices.map((index) => [0, 1, 2].map((k) => points[3 * index + k]!) as Vector) as [Vector, Vector, Vector] };
 }
 
-/** What a view has at a place; null where it has other triangles than those that the place is in one of. */
+/** What a view has at a place; null where its triangles are others than when the place was found. */
 export function readProbe({ topology: own, triangle, weights: at }: Probe, topology: TopologyFrame, frame: DataFrame, { field: name, component }: Pick<Look, "field" | "component">): ProbeReading | null {
   if (topology.topology !== own) return null;
   const corners = cornersOf(triangle, topology, frame.points);
