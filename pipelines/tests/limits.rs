@@ -95,6 +95,12 @@ fn an_order_may_hold_so_much() {
     };
     all_take(&faces(LISTED.most / 2));
     all_say(&faces(LISTED.most / 2 + 1), &words(LISTED, LISTED.most + 2));
+    let named = |count: usize| {
+        let names = list("\"a\"", count);
+        format!(r#"{{"edits":[{{"translate":{{"features":{names},"by":[0,0,1]}}}}]}}"#)
+    };
+    all_take(&named(LISTED.most));
+    all_say(&named(LISTED.most + 1), &words(LISTED, LISTED.most + 1));
 }
 
 #[test]
