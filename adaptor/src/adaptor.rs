@@ -336,7 +336,7 @@ impl Adaptor {
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
         let moment = step.moment();
-        let is_called = self.communicator.size() == 1 && self.queue.has_called();
+        let is_called = self.communicator.size() == 1 && self.is_called(moment);
         let by_orders = match &self.mesh {
             SteeredMesh::Unknown => true,
             SteeredMesh::Unsteered | SteeredMesh::Refused(_) => false,
@@ -381,6 +381,12 @@ impl Adaptor {
         self.pipelines.history(pipeline)
     }
 
+    /// Whether there is something of viewers to be looked at, on rank 0.
+    #[inline]
+    fn is_called(&self, moment: Moment) -> bool {
+        self.queue.has_called() || self.resumed.has_put_off(moment.cycle)
+    }
+
     /// Whether rank 0 was called to look at something; an error where any rank has one. `None`
     /// between two meetings of the ranks: then nothing is done, and a fault waits for the next, so
     /// that all ranks have it at the same call.
@@ -391,7 +397,7 @@ impl Adaptor {
         fault: Option<ExecuteError>,
         entered: Instant,
     ) -> Result<Option<(bool, Outside)>, ExecuteError> {
-        let called = self.queue.has_called();
+        let called = self.is_called(moment);
         let mut outside = Outside::default();
         if self.pipelines.listens() {
             outside.seconds = entered.duration_since(self.timing.begun).as_secs_f64();

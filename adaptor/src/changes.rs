@@ -120,21 +120,21 @@ impl Changes {
         change: PipelineChange,
         text: &str,
     ) -> Result<(), Problem> {
-        let Some(id) = self.log.name(client, id, text).map_err(Problem::new)? else {
+        let mut absolute = change.clone();
+        make_absolute(&mut absolute);
+        let command = Command::Pipelines(absolute.clone());
+        let Some(id) = self.log.name(client, id, &command).map_err(Problem::new)? else {
             return Ok(());
         };
         if let Err(problem) = self.check(&change) {
             self.log.forget(&id);
             return Err(problem);
         }
-        let mut change = change;
-        make_absolute(&mut change);
-        let command = Command::Pipelines(change.clone());
         let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
             self.log.forget(&id);
             come_back(exceeded)
         })?;
-        lock(&self.state).under_way.push((id.clone(), Arc::new(change)));
+        lock(&self.state).under_way.push((id.clone(), Arc::new(absolute)));
         let changes = Arc::clone(self);
         let source = Source::Viewer(client);
         let received = Received {

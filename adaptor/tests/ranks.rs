@@ -506,3 +506,41 @@ fn orders_move_all_parts_at_the_same_cycle() {
         }
     }
 }
+
+#[test]
+fn an_order_that_waits_too_long_for_the_solver_is_rejected_on_all_ranks() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let moved = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let mut settings = Settings {
+            config: config(LINK_TO_ALL),
+            communicator: Arc::new(ranks),
+            ..Settings::default()
+        };
+        settings.config.steering.deadline = std::num::NonZeroU32::MIN;
+        let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+        let speed = speed(&part);
+        let fields = [FieldView::vertex("speed", &speed)];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+        let mut viewer = None;
+        let mut moved = false;
+        for cycle in 0..5 {
+            moved |= adaptor.execute(&step(cycle), &channels).expect("execute").motion.is_some();
+            if rank == 0 && cycle == 0 {
+                let connected = viewer.insert(Viewer::connect(&adaptor));
+                connected.hello();
+                connected.send(&json!({"id": "late", "order": squeeze(0.1)}));
+                connected.wait_for("order", |order| order["status"] == "accepted");
+                std::thread::sleep(Duration::from_millis(1200));
+            }
+        }
+        if let Some(mut viewer) = viewer {
+            let late = viewer.wait_for("order", |order| order["status"] == "rejected");
+            assert!(late["reason"].as_str().unwrap().contains("steering.deadline"), "{late}");
+        }
+        adaptor.finalize().expect("finalize");
+        moved
+    });
+    assert_eq!(moved, [false; RANKS]);
+}

@@ -135,7 +135,7 @@ fn wait_for_lock(file: &Path) {
     }
 }
 
-/// The cycle of the last whole line that names one.
+/// The last cycle of which lines that are whole tell.
 fn last_cycle(journal: &str) -> usize {
     let whole = journal.rsplit_once('\n').map_or("", |(whole, _)| whole);
     let cycle = |line: &str| {
@@ -144,91 +144,194 @@ fn last_cycle(journal: &str) -> usize {
         let of_command = line["cycle"].as_u64().filter(|_| is_settled);
         of_command.or(line["shape"]["cycle"].as_u64())
     };
-    let cycle = whole.lines().rev().find_map(cycle).unwrap_or(0);
-    usize::try_from(cycle).unwrap()
+    usize::try_from(whole.lines().filter_map(cycle).max().unwrap_or(0)).unwrap()
 }
 
-/// What viewers ask for is found in the journal, wherever that was cut off; no order that was
-/// acknowledged is missing, and none is there twice.
-#[test]
-fn what_was_accepted_after_the_checkpoint_is_done_again() {
-    let seeds = std::env::var("TOMBOLO_SEEDS").ok().and_then(|text| text.parse().ok());
-    let mut done_again = 0;
-    for seed in 0..seeds.unwrap_or(6) {
-        let mut random = Rng::with_seed(seed);
-        let output = tempfile::tempdir().unwrap();
-        let file = output.path().join("journal.jsonl");
-        let mut solver = Solver::new(settings(output.path(), true));
+/// A run that is killed and goes on, again and again.
+struct Killed {
+    random: Rng,
+    output: tempfile::TempDir,
+    seed: u64,
+    /// What a run that was never killed would have done so far.
+    trace: Trace,
+    /// Messages sent so far.
+    sent: u64,
+    /// Orders of which a viewer was told that they are accepted, and which no disk has lost.
+    acknowledged: Vec<String>,
+    /// The state that the next run goes on from, and its cycle.
+    state: Option<(Vec<u8>, Mesh, u64)>,
+}
+
+impl Killed {
+    fn new(seed: u64) -> Self {
+        Self {
+            random: Rng::with_seed(seed),
+            output: tempfile::tempdir().unwrap(),
+            seed,
+            trace: Trace::new(),
+            sent: 0,
+            acknowledged: Vec::new(),
+            state: None,
+        }
+    }
+
+    fn file(&self) -> std::path::PathBuf {
+        self.output.path().join("journal.jsonl")
+    }
+
+    fn journal(&self) -> String {
+        std::fs::read_to_string(self.file()).unwrap_or_default()
+    }
+
+    /// The solver that begins, or goes on from the state that was saved.
+    fn start(&self) -> Solver {
+        let settings = settings(self.output.path(), true);
+        let Some((state, mesh, cycle)) = &self.state else { return Solver::new(settings) };
+        let checkpoint = Checkpoint::from_bytes(state).unwrap();
+        let mut solver = Solver::new(settings.restart(checkpoint));
+        (solver.mesh, solver.cycle) = (mesh.clone(), *cycle);
+        solver
+    }
+
+    /// Compares what a run does again with what was done, as far as the journal tells.
+    fn take_over(&mut self, done: Trace, known: usize) -> usize {
+        let from = usize::try_from(self.state.as_ref().map_or(0, |state| state.2)).unwrap();
+        let again = known.saturating_sub(from).min(done.len());
+        let what = format!("seed {}:\n{}", self.seed, self.journal());
+        assert_same(&done[..again], &self.trace, from, &what);
+        let kept = self.trace.get(from + done.len()..known.max(from + done.len()));
+        let rest = kept.unwrap_or_default().to_vec();
+        self.trace.truncate(from);
+        self.trace.extend(done);
+        self.trace.extend(rest);
+        again
+    }
+
+    /// The last cycle of which the journal tells behind the checkpoint.
+    fn known(&self) -> usize {
+        let journal = self.journal();
+        let mark = journal.rfind("{\"checkpoint\":").unwrap_or(journal.len());
+        last_cycle(&journal[mark..])
+    }
+
+    /// Runs with a viewer that asks for this and that, and is killed; says how many cycles it has
+    /// done again. It saves its state at this cycle, if at any.
+    fn run(&mut self, cycles: u64, saved: Option<u64>) -> usize {
+        let known = self.known();
+        let mut solver = self.start();
         let mut viewer = Viewer::connect(&solver.adaptor);
         viewer.hello();
-        let mut trace = Trace::new();
-        let (saved, killed) = (5 + random.u64(..30), 6 + random.u64(..30));
+        let mut done = Trace::new();
         let mut state = None;
-        let mut sent = 0;
-        for cycle in 0..saved + killed {
-            if random.u64(..4) == 0 {
-                viewer.send(&random_message(&mut random, sent));
-                sent += 1;
-                if random.u64(..2) == 0 {
+        for cycle in 0..cycles {
+            if self.random.u64(..4) == 0 {
+                viewer.send(&random_message(&mut self.random, self.sent));
+                self.sent += 1;
+                if self.random.u64(..2) == 0 {
                     viewer.look_for("order", Duration::from_millis(5), |_| false);
                 }
             }
-            if cycle == saved {
-                state = Some((solver.adaptor.checkpoint(), solver.mesh.clone()));
+            if Some(cycle) == saved {
+                let bytes = solver.adaptor.checkpoint().to_bytes();
+                state = Some((bytes, solver.mesh.clone(), solver.cycle));
             }
-            step(&mut solver, &mut trace);
-            std::thread::sleep(Duration::from_micros(random.u64(..3000)));
+            step(&mut solver, &mut done);
+            std::thread::sleep(Duration::from_micros(self.random.u64(..3000)));
         }
         while viewer.look_for("nothing", Duration::from_millis(1), |_| true).is_some() {}
         let accepted = |message: &Value| {
             let order = message.get("order")?;
             (order["status"] == "accepted").then(|| order["id"].as_str().unwrap().to_owned())
         };
-        let mut acknowledged: Vec<String> = viewer.seen.iter().filter_map(accepted).collect();
+        self.acknowledged.extend(viewer.seen.iter().filter_map(accepted));
+        self.acknowledged.sort();
+        self.acknowledged.dedup();
         drop((solver, viewer));
-        wait_for_lock(&file);
-        let journal = std::fs::read_to_string(&file).unwrap();
-        // What the disk had when the machine lost its power.
-        let mark = journal.find("{\"checkpoint\":").unwrap();
-        if random.u64(..2) == 0 {
-            let end = mark + random.u64(..(journal.len() - mark) as u64 + 1) as usize;
-            std::fs::write(&file, &journal[..journal.floor_char_boundary(end)]).unwrap();
-            acknowledged.clear();
+        wait_for_lock(&self.file());
+        let again = self.take_over(done, known);
+        if let Some(state) = state {
+            self.state = Some(state);
         }
-        let journal = std::fs::read_to_string(&file).unwrap();
-        let known = last_cycle(&journal[mark.min(journal.len())..]);
-        let (checkpoint, mesh) = state.unwrap();
-        let mut again = Solver::new(settings(output.path(), true).restart(checkpoint));
-        (again.mesh, again.cycle) = (mesh, saved);
-        let mut resumed = Trace::new();
-        for _ in saved..saved + killed + 40 {
-            step(&mut again, &mut resumed);
+        again
+    }
+
+    /// Has the disk lose what came after some place behind the last checkpoint, as one does that
+    /// loses its power.
+    fn lose_power(&mut self) {
+        let journal = self.journal();
+        let mark = journal.rfind("{\"checkpoint\":").unwrap();
+        // The first line of a run is on disk before it begins.
+        let mark = mark.max(journal.rfind("{\"run\":").unwrap());
+        let end = mark + self.random.u64(..(journal.len() - mark) as u64 + 1) as usize;
+        let end = journal.floor_char_boundary(end);
+        std::fs::write(self.file(), &journal[..end]).unwrap();
+        let has = |id: &String| {
+            journal[..end].contains(&format!("{{\"id\":\"{id}\",\"status\":\"accepted\""))
+        };
+        self.acknowledged.retain(has);
+    }
+
+    /// Runs to the end, and checks that each order that was acknowledged is there once.
+    fn finish(&mut self) -> usize {
+        let (known, journal) = (self.known(), self.journal());
+        let mut solver = self.start();
+        let from = self.state.as_ref().map_or(0, |state| state.2);
+        let mut done = Trace::new();
+        for _ in from..(known as u64).max(from) + 60 {
+            step(&mut solver, &mut done);
             std::thread::sleep(Duration::from_millis(1));
         }
-        let from = usize::try_from(saved).unwrap();
-        let until = known.saturating_sub(from).min(resumed.len());
-        assert_same(&resumed[..until], &trace, from, &format!("seed {seed}:\n{journal}"));
-        done_again += until;
-        let orders = again.finish().orders;
+        let again = self.take_over(done, known);
+        let orders = solver.finish().orders;
         // An order that was refused before the end stays refused, and is in the report as the others are.
         let refused =
             |id: &String| journal.contains(&format!("{{\"id\":\"{id}\",\"status\":\"rejected\""));
-        for id in &acknowledged {
+        for id in &self.acknowledged {
             let found: Vec<_> = orders.iter().filter(|order| order.id == *id).collect();
+            let seed = self.seed;
             assert_eq!(found.len(), 1, "seed {seed}: {id} in {orders:?}\n{journal}");
             assert!(!refused(id) || found[0].status == OrderStatus::Rejected, "seed {seed}: {id}");
         }
-        // Both runs in one journal are one run.
-        let journal = std::fs::read_to_string(&file).unwrap();
+        again
+    }
+
+    /// All runs in one journal are one run.
+    fn replay(&self) {
+        let journal = self.journal();
         let recording = parse_journal(&journal, "journal.jsonl").unwrap();
         let output = tempfile::tempdir().unwrap();
-        let mut replayed =
-            Solver::new(Settings { replay: Some(recording), ..settings(output.path(), true) });
+        let replay = Settings { replay: Some(recording), ..settings(output.path(), true) };
+        let mut replayed = Solver::new(replay);
         let mut found = Trace::new();
-        (0..from + resumed.len()).for_each(|_| step(&mut replayed, &mut found));
-        trace.truncate(from);
-        trace.extend(resumed);
-        assert_same(&found, &trace, 0, &format!("seed {seed}, replayed:\n{journal}"));
+        self.trace.iter().for_each(|_| step(&mut replayed, &mut found));
+        assert_same(&found, &self.trace, 0, &format!("seed {}, replayed:\n{journal}", self.seed));
+    }
+}
+
+/// What viewers ask for is found in the journal, wherever that was cut off and however often the run
+/// was killed; no order that was acknowledged is missing, and none is there twice.
+#[test]
+fn what_was_accepted_after_the_checkpoint_is_done_again() {
+    let seeds = std::env::var("TOMBOLO_SEEDS").ok().and_then(|text| text.parse().ok());
+    let mut done_again = 0;
+    for seed in 0..seeds.unwrap_or(6) {
+        let mut run = Killed::new(seed);
+        let (saved, killed) = (5 + run.random.u64(..30), 6 + run.random.u64(..30));
+        run.run(saved + killed, Some(saved));
+        // The next ones go on from the same state, or have come to one of their own.
+        for _ in 0..seed % 3 {
+            if run.random.u64(..3) == 0 {
+                run.lose_power();
+            }
+            let cycles = 1 + run.random.u64(..40);
+            let saved = (run.random.u64(..3) == 0).then(|| run.random.u64(..cycles));
+            done_again += run.run(cycles, saved);
+        }
+        if run.random.u64(..2) == 0 {
+            run.lose_power();
+        }
+        done_again += run.finish();
+        run.replay();
     }
     assert!(done_again > 0, "only {done_again} cycles were done again");
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tombolo_deform::communicator::{Alarm, Communicator, Writer};
-use tombolo_pipelines::language::{CheckpointNote, JournalNote, TimedCommand};
+use tombolo_pipelines::language::{CheckpointNote, TimedCommand};
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
@@ -33,7 +33,7 @@ impl Adaptor {
         // Before anything is looked at: what has a line behind it is not missed, even if it is here
         // too.
         let note = CheckpointNote { id: id.clone(), cycle, time };
-        self.log.note_and_wait(&JournalNote::Checkpoint(note));
+        self.log.checkpoint(note);
         let changes = self.waiting_changes.iter().map(super::changing::WaitingChange::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
         let before = waiting.len();

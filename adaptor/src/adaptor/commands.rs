@@ -1,6 +1,7 @@
 //! The intake of commands: from viewers, files and pipelines to what they change.
 
 use std::{
+    collections::VecDeque,
     sync::{Arc, Mutex, OnceLock},
     time::{Duration, Instant},
 };
@@ -99,7 +100,7 @@ impl Adaptor {
 
     /// Carries out what viewers and others have asked for meanwhile, as far as it can be now.
     pub(super) fn serve(&mut self, moment: Moment, channels: &[Channel<'_>]) {
-        let received: Vec<Received> = self.queue.take().into();
+        let received = self.take_received(moment);
         let (whence, own): (Vec<_>, _) = received
             .into_iter()
             .map(|Received { source, reservation, id, command }| {
@@ -136,6 +137,24 @@ impl Adaptor {
             self.tell_stack();
             self.tell_conditions();
         }
+    }
+
+    /// The commands whose turn it is. While a restarted run repeats what was done before, new ones wait:
+    /// they would change what the next restart has to repeat.
+    fn take_received(&mut self, moment: Moment) -> VecDeque<Received> {
+        let Some(until) = self.resumed.repeats_until(moment.cycle) else {
+            self.resumed.puts_off = false;
+            return self.queue.take();
+        };
+        let urgent = self.queue.take_urgent();
+        let mut put_off = Vec::new();
+        self.queue.look(|received| put_off.push(received.id.clone()));
+        self.resumed.puts_off = !put_off.is_empty();
+        let reason = format!("cycle {until}, up to which the run repeats what it has done before");
+        for id in put_off {
+            self.log.update(&id, |order| order.waits_for = Some(reason.clone()));
+        }
+        urgent
     }
 
     /// Has the steered mesh made ready for orders once somebody may give one. Collective.
@@ -405,7 +424,7 @@ impl CommandSink for Intake {
         };
         check_files(&command)?;
         // A command that came before is answered, however many wait.
-        let Some(id) = self.log.name(client, id, text)? else { return Ok(()) };
+        let Some(id) = self.log.name(client, id, &command)? else { return Ok(()) };
         let reservation = self.queue.reserve(&command, text.len()).map_err(|exceeded| {
             self.log.forget(&id);
             format!(

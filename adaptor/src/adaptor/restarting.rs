@@ -35,6 +35,8 @@ use crate::{
 pub(super) struct Resumed {
     mesh: Option<(SavedMesh, SavedPoints)>,
     again: Again,
+    /// Whether new commands wait until nothing is repeated any more.
+    pub(super) puts_off: bool,
 }
 
 /// The commands carried out again after a checkpoint, equal on all ranks.
@@ -106,8 +108,7 @@ impl Continued {
 
     /// What the journal says of it.
     pub(super) fn restarted_from(&self) -> RestartedFrom {
-        let SavedRun { id, run, cycle, .. } = &self.checkpoint.run;
-        RestartedFrom { run: run.clone(), checkpoint: id.clone(), cycle: *cycle }
+        restarted_from(&self.checkpoint.run)
     }
 
     /// The notes that were pinned in the run before.
@@ -118,7 +119,7 @@ impl Continued {
     /// What is left once a run has been set up.
     pub(super) fn into_resumed(self) -> Resumed {
         let Checkpoint { run, points, .. } = self.checkpoint;
-        Resumed { mesh: run.mesh.zip(points), again: self.again }
+        Resumed { mesh: run.mesh.zip(points), again: self.again, puts_off: false }
     }
 }
 
@@ -170,7 +171,11 @@ fn read_since(file: &Path, run: &SavedRun) -> Result<Since, CheckpointError> {
         }
         Err(reason) => return Err(error(reason.to_string())),
     };
-    Since::read(journal, &run.run, &run.id).map_err(|reason| error(reason.to_string()))
+    Since::read(journal, &restarted_from(run)).map_err(|reason| error(reason.to_string()))
+}
+
+fn restarted_from(run: &SavedRun) -> RestartedFrom {
+    RestartedFrom { run: run.run.clone(), checkpoint: run.id.clone(), cycle: run.cycle }
 }
 
 impl Again {
@@ -239,6 +244,18 @@ impl Resumed {
         self.again.commands.front().is_some_and(|next| next.cycle <= cycle)
     }
 
+    /// The last cycle at which what the journal tells is repeated, unless that is behind.
+    #[inline]
+    pub(super) fn repeats_until(&self, cycle: u64) -> Option<u64> {
+        self.again.until.filter(|until| cycle <= *until)
+    }
+
+    /// Whether new commands were put off and nothing is repeated any more.
+    #[inline]
+    pub(super) fn has_put_off(&self, cycle: u64) -> bool {
+        self.puts_off && self.repeats_until(cycle).is_none()
+    }
+
     pub(super) fn is_over(&self) -> bool {
         self.again.commands.is_empty()
     }
@@ -286,7 +303,7 @@ impl Adaptor {
             return;
         }
         for (SavedCommand { id, by, command }, reason) in &self.resumed.again.rejected {
-            self.log.reserve(id);
+            self.log.reserve(id, command);
             if !matches!(command, Command::Order(_)) {
                 continue;
             }
@@ -297,7 +314,9 @@ impl Adaptor {
             }
             self.log.reject(id, self.moment, &reason.into());
         }
-        self.resumed.again.commands.iter().for_each(|command| self.log.reserve(&command.id));
+        for CommandAgain { id, command, .. } in &self.resumed.again.commands {
+            self.log.reserve(id, command);
+        }
     }
 
     /// Does again what is due of the commands of the run before; first those that were there before

@@ -12,7 +12,7 @@ use std::{
 };
 
 use tombolo_pipelines::{
-    language::{JournalEntry, JournalNote, LostLines, OrderStatus},
+    language::{CheckpointNote, JournalEntry, JournalNote, LostLines, OrderStatus},
     limits::{WAITING, WAITING_BYTES},
 };
 
@@ -23,7 +23,8 @@ use super::{
 use crate::lock::lock;
 
 /// Bytes of lines that nobody waits for and that are kept while nothing can be written, or while the
-/// disk takes longer than [`PATIENCE`].
+/// disk takes longer than [`PATIENCE`]. Lines about checkpoints, without which a restart does not find
+/// what came after, are kept up to twice as many.
 const KEPT: usize = 4 << 20;
 /// How long a disk may take before the journal counts as lost.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -130,39 +131,42 @@ impl Journal {
         self.push(line(note));
     }
 
-    /// Has a line about the run written, and returns once it and all before it are on disk: after
-    /// two seconds at the latest, and at once while nothing can be written.
-    pub(crate) fn note_and_wait(&self, note: &JournalNote) {
-        if !self.write_and_wait(line(note)) {
-            self.note(note);
+    /// Hands a line about a checkpoint over to be written, and returns once it and all before it are
+    /// on disk: after two seconds at the latest, and at once while nothing can be written. It stays
+    /// where it is among the lines until it is written.
+    pub(crate) fn checkpoint(&self, note: CheckpointNote) {
+        let Some(shared) = &self.shared else { return };
+        let text = line(&JournalNote::Checkpoint(note));
+        let mut state = lock(&shared.state);
+        if state.kept + text.len() > 2 * KEPT {
+            state.lost += 1;
+        } else {
+            state.push(Line { text, asked: None, is_withdrawn: false });
         }
+        drop(state);
+        self.wait();
     }
 
     /// Returns once all lines so far are on disk and whoever waits for one of them has heard of it:
     /// after two seconds at the latest, and at once while nothing can be written.
     pub(crate) fn wait(&self) {
-        self.write_and_wait(Vec::new());
-    }
-
-    /// Has a text written and waits; `false` where that would be in vain.
-    fn write_and_wait(&self, text: Vec<u8>) -> bool {
-        let Some(shared) = &self.shared else { return true };
+        let Some(shared) = &self.shared else { return };
         let (done, written) = std::sync::mpsc::channel();
         let mut state = lock(&shared.state);
         if state.trouble.is_some() || state.is_closed {
-            return false;
+            return;
         }
         let settle: Settle = Box::new(move |_| {
             let _ = done.send(());
         });
-        // Should it be written after all, it needs no line that takes it back.
-        state.push(Line { text, asked: Some((settle, Vec::new())), is_withdrawn: false });
+        // It has no text of its own, and none that takes it back.
+        let asked = Some((settle, Vec::new()));
+        state.push(Line { text: Vec::new(), asked, is_withdrawn: false });
         shared.changed.notify_all();
         drop(state);
         if written.recv_timeout(END).is_err() {
             log::warn!("the disk does not answer: the journal's last lines are not on it yet");
         }
-        true
     }
 
     /// Whether there is a journal.
@@ -287,6 +291,10 @@ impl Waiting {
         self.lines.push_back(line);
     }
 
+    fn has_nothing_to_write(&self) -> bool {
+        self.lines.is_empty() && self.lost == 0
+    }
+
     /// Whether the disk has not answered for too long.
     fn is_slow(&self) -> bool {
         self.since.is_some_and(|since| since.elapsed() >= PATIENCE)
@@ -331,10 +339,10 @@ impl Shared {
         let mut state = lock(&self.state);
         let mut last: Option<Instant> = None;
         loop {
-            while state.lines.is_empty() && state.lost == 0 && !state.is_closed {
+            while state.has_nothing_to_write() && state.trouble.is_none() && !state.is_closed {
                 state = crate::lock::wait(&self.changed, state);
             }
-            if state.lines.is_empty() && state.lost == 0 {
+            if state.has_nothing_to_write() && state.is_closed {
                 break;
             }
             let until = last.map(|last| last + GATHERED);
@@ -349,7 +357,8 @@ impl Shared {
             let mut text = Vec::with_capacity(state.bytes);
             state.under_way = std::mem::take(&mut state.lines).into();
             state.under_way.iter().for_each(|line| text.extend(&line.text));
-            if lost > 0 {
+            // Where nothing is left of what could not be written, this finds out whether it goes on.
+            if lost > 0 || text.is_empty() && state.trouble.is_some() {
                 text.extend(line(&JournalNote::Lost(LostLines { lines: lost })));
             }
             state.since = Some(Instant::now());

@@ -2,16 +2,16 @@
 
 use std::{
     collections::{HashMap, HashSet, VecDeque},
-    hash::{DefaultHasher, Hash, Hasher},
     sync::Arc,
 };
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tombolo_deform::edit::Edit;
-use tombolo_pipelines::language::Order;
+use tombolo_pipelines::language::{Command, Order};
 
 use super::order_report::{ORDERS_KEPT, OrderReport, OrderStatus};
+use crate::fingerprint::hash;
 
 /// Orders that a viewer is told of when it connects.
 const ORDERS_TOLD: usize = 100;
@@ -28,7 +28,8 @@ pub(crate) struct KnownCommands {
     given: VecDeque<(String, Arc<Order>)>,
     /// The answers to the newest of the other commands.
     outcomes: VecDeque<(String, Value)>,
-    /// The names that are taken, with what their messages say; oldest first in `named`.
+    /// The names that are taken, with hashes of what viewers have asked for under them; oldest first in
+    /// `named`.
     names: HashMap<String, Option<u64>>,
     named: VecDeque<String>,
     /// The names of commands that were given beforehand and whose turn has not come.
@@ -59,26 +60,22 @@ impl KnownOrder {
 pub(crate) enum Named {
     /// It is a new command.
     New(String),
-    /// The message came before, with the same text.
+    /// The same command came before under this name.
     Again(String),
 }
 
 impl KnownCommands {
-    /// Gives a command a name: the one that is wanted, or a new one. `text` is the message that it
-    /// came in.
+    /// Gives a command a name: the one that is wanted, or a new one. `command` is that of a viewer,
+    /// who may send it again.
     ///
     /// # Errors
     /// Where another command has that name already.
     pub(super) fn name(
         &mut self,
         wanted: Option<String>,
-        text: Option<&str>,
+        command: Option<&Command>,
     ) -> Result<Named, String> {
-        let digest = text.map(|text| {
-            let mut hasher = DefaultHasher::new();
-            text.hash(&mut hasher);
-            hasher.finish()
-        });
+        let digest = command.map(hash_of);
         let id = match wanted {
             Some(id) => match self.names.get(&id) {
                 Some(known) if known.is_some() && *known == digest => return Ok(Named::Again(id)),
@@ -97,11 +94,11 @@ impl KnownCommands {
         Ok(Named::New(id))
     }
 
-    /// Keeps the name of a command of an earlier run from others; whether it is an order that is
-    /// known.
-    pub(super) fn reserve(&mut self, id: &str) -> bool {
+    /// Keeps the name of a command of an earlier run from others, but for the viewer that sends it
+    /// again; whether it is an order that is known.
+    pub(super) fn reserve(&mut self, id: &str, command: &Command) -> bool {
         if !self.names.contains_key(id) {
-            self.names.insert(id.to_owned(), None);
+            self.names.insert(id.to_owned(), Some(hash_of(command)));
             self.named.push_back(id.to_owned());
         }
         self.order(id).is_some()
@@ -217,6 +214,11 @@ impl KnownCommands {
     }
 }
 
+/// A hash by which commands of one name are told apart.
+fn hash_of(command: &Command) -> u64 {
+    hash(serde_json::to_vec(command).unwrap_or_default())
+}
+
 /// An order as JSON, unless it is long; of a long one no more is written than it takes to find that
 /// out.
 fn told_whole(order: &Order) -> Option<Value> {
@@ -232,16 +234,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_message_again_is_known_and_another_of_its_name_is_refused() {
+    fn the_same_command_again_is_known_and_another_of_its_name_is_refused() {
         let mut known = KnownCommands::default();
-        let named = |known: &mut KnownCommands, text| known.name(Some("a".into()), text);
-        assert_eq!(named(&mut known, Some("x")), Ok(Named::New("a".into())));
-        assert_eq!(named(&mut known, Some("x")), Ok(Named::Again("a".into())));
-        assert!(named(&mut known, Some("y")).is_err() && named(&mut known, None).is_err());
+        let named = |known: &mut KnownCommands, command| known.name(Some("a".into()), command);
+        let (pause, stop) = (Command::Pause {}, Command::Stop {});
+        assert_eq!(named(&mut known, Some(&pause)), Ok(Named::New("a".into())));
+        assert_eq!(named(&mut known, Some(&pause)), Ok(Named::Again("a".into())));
+        assert!(named(&mut known, Some(&stop)).is_err() && named(&mut known, None).is_err());
         known.forget("a");
-        assert_eq!(named(&mut known, Some("y")), Ok(Named::New("a".into())));
+        assert_eq!(named(&mut known, Some(&stop)), Ok(Named::New("a".into())));
         assert_eq!(known.name(None, None), Ok(Named::New("o1".into())));
         assert!(known.name(Some("o1".into()), None).is_err());
+        // One of an earlier run may be sent again too.
+        known.reserve("b", &pause);
+        assert_eq!(known.name(Some("b".into()), Some(&pause)), Ok(Named::Again("b".into())));
+        assert!(known.name(Some("b".into()), Some(&stop)).is_err());
     }
 
     #[test]
@@ -249,7 +256,7 @@ mod tests {
         let mut known = KnownCommands::default();
         ["o1", "o3"].iter().for_each(|id| known.expect(id));
         assert_eq!(known.name(None, None), Ok(Named::New("o2".into())));
-        assert!(known.name(Some("o3".into()), Some("x")).is_err());
+        assert!(known.name(Some("o3".into()), Some(&Command::Pause {})).is_err());
         known.has_come("o3");
         assert_eq!(known.name(Some("o3".into()), None), Ok(Named::New("o3".into())));
         // One that was given to two commands is the first one's.

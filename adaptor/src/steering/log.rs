@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 use tombolo_pipelines::language::{
-    Command, CommandAuthor, HandedShape, JournalEntry, JournalNote, OrderStatus as JournalStatus,
-    PinnedNote, RunEnd,
+    CheckpointNote, Command, CommandAuthor, HandedShape, JournalEntry, JournalNote,
+    OrderStatus as JournalStatus, PinnedNote, RunEnd,
 };
 
 use super::{
@@ -81,9 +81,10 @@ impl Log {
         lock(&self.state).clone()
     }
 
-    /// Keeps the name of a command of an earlier run from others.
-    pub(crate) fn reserve(&self, id: &str) {
-        lock(&self.state).reserve(id);
+    /// Keeps the name of a command of an earlier run from others, but for the viewer that sends it
+    /// again.
+    pub(crate) fn reserve(&self, id: &str, command: &Command) {
+        lock(&self.state).reserve(id, command);
     }
 
     /// Keeps the names of commands that were given beforehand for them.
@@ -100,7 +101,7 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) {
-        let is_known = lock(&self.state).reserve(id);
+        let is_known = lock(&self.state).reserve(id, command);
         self.journal.write(&accepted(id, source, command, moment));
         if !is_known {
             self.admit(id, command, moment);
@@ -132,8 +133,8 @@ impl Log {
         Ok(id)
     }
 
-    /// Names a command of a viewer that came in the message `text`. The same message may come again
-    /// where a connection was lost: it is answered by what became of the command.
+    /// Names a command of a viewer. It may come again where a connection was lost: it is answered by
+    /// what became of it.
     ///
     /// # Errors
     /// Where another command has that name already.
@@ -141,9 +142,9 @@ impl Log {
         &self,
         client: u64,
         wanted: Option<String>,
-        text: &str,
+        command: &Command,
     ) -> Result<Option<String>, String> {
-        let named = lock(&self.state).name(wanted, Some(text))?;
+        let named = lock(&self.state).name(wanted, Some(command))?;
         match named {
             Named::New(id) => Ok(Some(id)),
             Named::Again(id) => {
@@ -244,9 +245,17 @@ impl Log {
             Ok(()) => json!({"done": {"id": id, "cycle": cycle, "time": time}}),
             Err(reason) => json!({"error": {"message": reason, "id": id}}),
         };
-        if let (Source::Viewer(client), Some(hub)) = (source, &self.hub) {
-            let told = told.clone();
-            hub.tell_client(*client, move || told);
+        match (source, &self.hub) {
+            (Source::Viewer(client), Some(hub)) => {
+                let told = told.clone();
+                hub.tell_client(*client, move || told);
+            }
+            // Who gave it may be another viewer of this run.
+            (Source::Earlier(CommandAuthor::Viewer(_), _), Some(hub)) => {
+                let told = told.clone();
+                hub.tell(move || told);
+            }
+            _ => {}
         }
         lock(&self.state).settle(id, told);
     }
@@ -291,10 +300,10 @@ impl Log {
         self.journal.note(note);
     }
 
-    /// Has a line about the run in the journal, and waits until it and all before it are on disk, two
-    /// seconds at most.
-    pub(crate) fn note_and_wait(&self, note: &JournalNote) {
-        self.journal.note_and_wait(note);
+    /// Has a line about a checkpoint in the journal, and waits until it and all before it are on disk,
+    /// two seconds at most.
+    pub(crate) fn checkpoint(&self, note: CheckpointNote) {
+        self.journal.checkpoint(note);
     }
 
     /// Waits until the journal's lines so far are on disk and the commands in them are taken in, two

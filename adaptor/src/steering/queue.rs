@@ -119,6 +119,17 @@ impl Queue {
         std::mem::take(&mut *waiting)
     }
 
+    /// What waits and cannot be put off: pauses and stops, for one. The rest is left.
+    pub(crate) fn take_urgent(&self) -> VecDeque<Received> {
+        let mut waiting = lock(&self.waiting);
+        self.attention.store(false, Ordering::Release);
+        let (urgent, rest) = std::mem::take(&mut *waiting)
+            .into_iter()
+            .partition(|received| is_urgent(&received.command));
+        *waiting = rest;
+        urgent
+    }
+
     /// Does something with all that waits, and leaves it there.
     pub(crate) fn look(&self, look: impl FnMut(&Received)) {
         lock(&self.waiting).iter().for_each(look);

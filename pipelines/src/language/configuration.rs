@@ -248,7 +248,7 @@ pub struct Steering {
     pub poll_steps: NonZeroU32,
     /// Seconds that an order of a viewer may wait for its turn, from when it came in: behind others,
     /// or for the solver. It is rejected then, so that nothing moves the mesh that nobody thinks of
-    /// any more. On several ranks an order waits for the solver alone, without end.
+    /// any more. An order that a restarted run takes over waits without end.
     pub deadline: NonZeroU32,
     /// Seconds after which a paused run goes on by itself while nobody is connected who could resume
     /// it. Left out, it stays paused.

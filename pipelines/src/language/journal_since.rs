@@ -5,7 +5,7 @@ use std::io::BufRead;
 
 use serde::{Deserialize, Serialize};
 
-use super::journal::{HandedShape, JournalNote, UnpinnedNote};
+use super::journal::{HandedShape, JournalNote, RestartedFrom, UnpinnedNote};
 use super::order::Command;
 use super::timed::{CommandAuthor, JournalEntry, OrderStatus};
 use super::together::{PinnedNote, pin};
@@ -86,19 +86,17 @@ pub enum SinceError {
 }
 
 impl Since {
-    /// Reads what `run` did after a checkpoint. A torn last line is passed over. No more is kept in
-    /// memory than what may wait in a run.
+    /// Reads what a run did after a checkpoint, and what the runs did that have gone on from there
+    /// since: each may have been killed before it had a checkpoint of its own. What a later one did
+    /// holds; what it had not come to again is still to come. A torn last line is passed over. No
+    /// more is kept in memory than what may wait in a run.
     ///
     /// # Errors
     /// [`SinceError`], which names the line.
-    pub fn read(
-        mut journal: impl BufRead,
-        run: &str,
-        checkpoint: &str,
-    ) -> Result<Self, SinceError> {
+    pub fn read(mut journal: impl BufRead, from: &RestartedFrom) -> Result<Self, SinceError> {
         let most = WAITING_BYTES.most as u64;
         let (mut number, mut line) = (0, Vec::new());
-        let mut found: Option<Reader> = None;
+        let mut reader = Reader::default();
         loop {
             line.clear();
             let read = std::io::Read::take(&mut journal, most).read_until(b'\n', &mut line)?;
@@ -106,27 +104,23 @@ impl Since {
             if read == 0 || line.last() != Some(&b'\n') {
                 break;
             }
-            let header = line.starts_with(b"{\"run\":").then(|| serde_json::from_slice(&line));
-            if let Some(header) = header {
-                if found.is_some() {
-                    break;
-                }
-                if matches!(header, Ok(JournalNote::Run(header)) if header.id == run) {
-                    found = Some(Reader::default());
-                }
+            if line.starts_with(b"{\"run\":") {
+                reader.begin(serde_json::from_slice(&line).ok(), from);
                 continue;
             }
-            let Some(reader) = &mut found else { continue };
+            if !reader.is_among_them {
+                continue;
+            }
             let entry = serde_json::from_slice(&line);
             reader.add(
                 entry.map_err(|error: serde_json::Error| SinceError::Line {
                     line: number,
                     message: error.to_string(),
                 })?,
-                checkpoint,
+                &from.checkpoint,
             )?;
         }
-        Ok(found.unwrap_or_default().finish())
+        Ok(reader.finish())
     }
 }
 
@@ -140,36 +134,109 @@ enum Line {
 
 #[derive(Default)]
 struct Reader {
-    /// Each with the number of the line that says what became of it.
-    taken: HashMap<String, (usize, Taken)>,
-    order: Vec<String>,
+    /// The run that made the checkpoint, and those that have gone on from there.
+    runs: HashSet<String>,
+    /// Whether the lines are of one of them.
+    is_among_them: bool,
+    taken: HashMap<String, Taken>,
+    /// The names of commands that were accepted, the oldest first.
+    accepted: Vec<String>,
+    history: History,
+    /// The history of the runs before, as far as the one that is read has not come to it again.
+    before: History,
     /// The commands of files and pipelines.
     given_again: HashSet<String>,
-    shapes: Vec<HandedShape>,
     notes: Vec<PinnedNote>,
-    until: Option<u64>,
     /// The cycle at which a command that is given again took effect last.
     last_given_again: Option<u64>,
     has_checkpoint: bool,
-    lines: usize,
+}
+
+/// What became of commands and of the mesh, in that order.
+#[derive(Default)]
+struct History {
+    /// The names of commands and the cycle at which it was settled what becomes of them.
+    settled: Vec<(String, u64)>,
+    shapes: Vec<HandedShape>,
+    until: Option<u64>,
+}
+
+impl History {
+    /// Takes the part up to a cycle out.
+    fn up_to(&mut self, cycle: u64) -> Self {
+        let rest = |settled: &(String, u64)| settled.1 > cycle;
+        let (later, settled) = std::mem::take(&mut self.settled).into_iter().partition(rest);
+        let (later_shapes, shapes) =
+            std::mem::take(&mut self.shapes).into_iter().partition(|shape| shape.cycle > cycle);
+        (self.settled, self.shapes) = (later, later_shapes);
+        Self { settled, shapes, until: self.until.min(Some(cycle)) }
+    }
+
+    /// Puts behind this what a run before it did, as far as this one has not come to it.
+    fn go_on_with(&mut self, before: Self) {
+        let known: HashSet<&String> = self.settled.iter().map(|(id, _)| id).collect();
+        let left: Vec<_> =
+            before.settled.into_iter().filter(|(id, _)| !known.contains(id)).collect();
+        self.settled.extend(left);
+        let last = self.shapes.last().map(|shape| shape.cycle);
+        self.shapes.extend(before.shapes.into_iter().filter(|shape| Some(shape.cycle) > last));
+        self.until = self.until.max(before.until);
+    }
 }
 
 impl Reader {
+    /// Takes the first line of a run in.
+    fn begin(&mut self, header: Option<JournalNote>, from: &RestartedFrom) {
+        self.is_among_them = false;
+        let Some(JournalNote::Run(header)) = header else { return };
+        let goes_on = header
+            .restart
+            .filter(|restart| self.runs.contains(&restart.run) && restart.cycle >= from.cycle);
+        if header.id != from.run && goes_on.is_none() {
+            return;
+        }
+        self.runs.insert(header.id);
+        self.is_among_them = true;
+        self.last_given_again = None;
+        self.join();
+        if let Some(restart) = goes_on {
+            // It has the line about its checkpoint behind it, also where that was lost.
+            self.come_to_checkpoint();
+            self.before = std::mem::take(&mut self.history);
+            self.history = self.before.up_to(restart.cycle);
+        }
+    }
+
+    /// Makes one history of that of the run which was read and that of those before it.
+    fn join(&mut self) {
+        let before = std::mem::take(&mut self.before);
+        self.history.go_on_with(before);
+    }
+
+    /// Lets go of what the checkpoint knows.
+    fn come_to_checkpoint(&mut self) {
+        if !std::mem::replace(&mut self.has_checkpoint, true) {
+            self.taken.retain(|_, taken| taken.outcome == Outcome::Open {});
+            self.history = History::default();
+            self.last_given_again = None;
+        }
+    }
+
     fn add(&mut self, line: Line, checkpoint: &str) -> Result<(), Exceeded> {
-        self.lines += 1;
         match line {
             Line::Note(note) => match *note {
                 JournalNote::Checkpoint(note) if note.id == checkpoint => {
-                    self.has_checkpoint = true;
-                    self.taken.retain(|_, (_, taken)| taken.outcome == Outcome::Open {});
-                    self.shapes.clear();
-                    (self.until, self.last_given_again) = (None, None);
+                    self.come_to_checkpoint();
                 }
                 JournalNote::Shape(shape) => {
-                    self.until = self.until.max(Some(shape.cycle));
-                    self.shapes.push(shape);
+                    self.history.until = self.history.until.max(Some(shape.cycle));
+                    self.history.shapes.push(shape);
                 }
-                JournalNote::Note(note) => pin(&mut self.notes, note)?,
+                JournalNote::Note(note) => {
+                    // A run that goes on writes down again what is pinned.
+                    self.notes.retain(|known| known.number != note.number);
+                    pin(&mut self.notes, note)?;
+                }
                 JournalNote::NoteRemoved(UnpinnedNote { number }) => {
                     self.notes.retain(|note| note.number != number);
                 }
@@ -191,8 +258,8 @@ impl Reader {
                 let by = by.unwrap_or(CommandAuthor::Program);
                 let (outcome, is_before) = (Outcome::Open {}, !self.has_checkpoint);
                 let taken = Taken { id: id.clone(), by, command, outcome, is_before };
-                self.order.push(id.clone());
-                self.taken.insert(id, (usize::MAX, taken));
+                self.accepted.push(id.clone());
+                self.taken.insert(id, taken);
                 WAITING.check(self.taken.len())?;
             }
             return Ok(());
@@ -200,18 +267,20 @@ impl Reader {
         if matches!(status, OrderStatus::NotFollowed | OrderStatus::NotConfirmed) {
             return Ok(());
         }
-        self.until = self.until.max(Some(cycle));
+        self.history.until = self.history.until.max(Some(cycle));
         let comes_late = self.last_given_again == Some(cycle);
-        if let Some((line, taken)) = self.taken.get_mut(&id) {
-            *line = self.lines;
+        if let Some(taken) = self.taken.get_mut(&id) {
             taken.outcome = match status {
                 OrderStatus::Applied => Outcome::Applied { cycle, comes_late },
                 _ => Outcome::Rejected { cycle, reason: reason.unwrap_or_default() },
             };
-            if !self.has_checkpoint {
+            if self.has_checkpoint {
+                self.history.settled.retain(|(known, _)| *known != id);
+                self.history.settled.push((id, cycle));
+            } else {
                 // Before the checkpoint what is settled is known to it.
                 self.taken.remove(&id);
-                self.order.retain(|known| *known != id);
+                self.accepted.retain(|known| *known != id);
             }
         } else if self.given_again.remove(&id) {
             self.last_given_again = Some(cycle);
@@ -220,15 +289,15 @@ impl Reader {
     }
 
     fn finish(mut self) -> Since {
+        self.join();
         if !self.has_checkpoint {
             // The line about the checkpoint was lost, and with it all that came after.
-            (self.shapes, self.until) = (Vec::new(), None);
+            self.history = History::default();
         }
-        let taken = self.order.iter().filter_map(|id| self.taken.remove(id));
-        let mut taken: Vec<(usize, Taken)> = taken.collect();
-        taken.sort_by_key(|(line, _)| *line);
-        let commands = taken.into_iter().map(|(_, taken)| taken).collect();
-        Since { commands, shapes: self.shapes, notes: self.notes, until: self.until }
+        let History { settled, shapes, until } = self.history;
+        let names = settled.into_iter().map(|(id, _)| id).chain(self.accepted);
+        let commands = names.filter_map(|id| self.taken.remove(&id)).collect();
+        Since { commands, shapes, notes: self.notes, until }
     }
 }
 
@@ -251,9 +320,14 @@ mod tests {
 {"id":"p","status":"accepted","cycle":5,"time":0,"parameter":{"name":"x","value":1},"by":{"viewer":"c1"}}
 {"id":"torn","sta"#;
 
+    fn read(journal: &str, run: &str) -> Result<Since, SinceError> {
+        let from = RestartedFrom { run: run.into(), checkpoint: "k".into(), cycle: 2 };
+        Since::read(journal.as_bytes(), &from)
+    }
+
     #[test]
     fn what_came_after_a_checkpoint_is_found() {
-        let since = Since::read(JOURNAL.as_bytes(), "r1", "k").unwrap();
+        let since = read(JOURNAL, "r1").unwrap();
         let outcomes: Vec<_> =
             since.commands.iter().map(|taken| (&*taken.id, taken.outcome.clone())).collect();
         assert_eq!(
@@ -265,13 +339,13 @@ mod tests {
             ]
         );
         assert_eq!((since.shapes.len(), since.until), (1, Some(5)));
-        assert_eq!(Since::read(JOURNAL.as_bytes(), "r2", "k").unwrap(), Since::default());
+        assert_eq!(read(JOURNAL, "r2").unwrap(), Since::default());
     }
 
     #[test]
     fn without_the_checkpoints_line_only_what_is_open_counts() {
         let cut = JOURNAL.find("{\"checkpoint\"").unwrap();
-        let since = Since::read(&JOURNAL.as_bytes()[..cut], "r1", "k").unwrap();
+        let since = read(&JOURNAL[..cut], "r1").unwrap();
         let ids: Vec<_> = since.commands.iter().map(|taken| &*taken.id).collect();
         assert_eq!((ids, since.shapes.len(), since.until), (vec!["open"], 0, None));
     }
@@ -279,10 +353,79 @@ mod tests {
     #[test]
     fn a_journal_cut_anywhere_is_read_or_refused() {
         for end in 0..JOURNAL.len() {
-            Since::read(&JOURNAL.as_bytes()[..end], "r1", "k").unwrap();
+            read(&JOURNAL[..end], "r1").unwrap();
         }
         let broken = JOURNAL.replace("\"status\":\"applied\",\"cycle\":4", "\"status\":7");
-        let error = Since::read(broken.as_bytes(), "r1", "k").unwrap_err();
+        let error = read(&broken, "r1").unwrap_err();
         assert!(error.to_string().starts_with("line 9: "), "{error}");
+    }
+    /// The lines of a run that goes on from the checkpoint, or from one of a run that did.
+    fn goes_on(id: &str, from: (&str, &str, u64), lines: &str) -> String {
+        let (run, checkpoint, cycle) = from;
+        let restart =
+            format!(r#""restart":{{"run":"{run}","checkpoint":"{checkpoint}","cycle":{cycle}}}"#);
+        let header =
+            JOURNAL.lines().next().unwrap().replace("\"id\":\"r1\"", &format!("\"id\":\"{id}\""));
+        format!("{}{restart}}}}}\n{lines}", header.replace("}}}", "},"))
+    }
+
+    fn settled(since: &Since) -> Vec<(&str, u64)> {
+        let cycle = |taken: &Taken| match taken.outcome {
+            Outcome::Open {} => 0,
+            Outcome::Applied { cycle, .. } | Outcome::Rejected { cycle, .. } => cycle,
+        };
+        since.commands.iter().map(|taken| (&*taken.id, cycle(taken))).collect()
+    }
+
+    #[test]
+    fn what_runs_did_that_were_killed_after_it_is_found_too() {
+        let whole = &JOURNAL[..JOURNAL.rfind('\n').unwrap() + 1];
+        // It came to the cycle 4 again, was killed before that was written whole, and took another in.
+        let second = goes_on(
+            "r2",
+            ("r1", "k", 2),
+            r#"{"id":"b","status":"accepted","cycle":4,"time":0,"order":{"undo":1},"by":{"viewer":"c1"}}
+{"id":"f","status":"accepted","cycle":4,"time":0,"order":{"undo":1},"by":"file"}
+{"id":"f","status":"applied","cycle":4,"time":0}
+{"id":"new","status":"accepted","cycle":4,"time":0,"order":{"undo":1},"by":{"viewer":"c2"}}
+"#,
+        );
+        let since = read(&format!("{whole}{second}"), "r1").unwrap();
+        assert_eq!(settled(&since), [("b", 4), ("open", 5), ("p", 0), ("new", 0)]);
+        assert_eq!((since.shapes.len(), since.until), (1, Some(5)));
+        // The next one went on beyond the end of both.
+        let third = goes_on(
+            "r3",
+            ("r1", "k", 2),
+            r#"{"id":"b","status":"applied","cycle":4,"time":0}
+{"shape":{"order":"f","shape":1,"cycle":4}}
+{"id":"open","status":"rejected","cycle":5,"time":0,"reason":"cancelled"}
+{"id":"new","status":"applied","cycle":7,"time":0}
+{"shape":{"order":"new","shape":1,"cycle":7}}
+{"checkpoint":{"id":"k3","cycle":7,"time":0}}
+{"id":"lost","status":"accepted","cycle":8,"time":0,"order":{"undo":1},"by":{"viewer":"c2"}}
+{"id":"lost","status":"applied","cycle":8,"time":0}
+{"shape":{"order":"lost","shape":1,"cycle":8}}
+"#,
+        );
+        let since = read(&format!("{whole}{second}{third}"), "r1").unwrap();
+        let expected = [("b", 4), ("open", 5), ("new", 7), ("lost", 8), ("p", 0)];
+        assert_eq!(settled(&since), expected);
+        let cycles: Vec<u64> = since.shapes.iter().map(|shape| shape.cycle).collect();
+        assert_eq!((&cycles[..], since.until), (&[4, 7, 8][..], Some(8)));
+        // One that went on from the checkpoint of that one has not done again all that came after it.
+        let fourth = goes_on(
+            "r4",
+            ("r3", "k3", 7),
+            r#"{"id":"late","status":"accepted","cycle":8,"time":0,"order":{"undo":1},"by":{"viewer":"c2"}}
+"#,
+        );
+        let since = read(&format!("{whole}{second}{third}{fourth}"), "r1").unwrap();
+        let expected = [("b", 4), ("open", 5), ("new", 7), ("lost", 8), ("p", 0), ("late", 0)];
+        assert_eq!((settled(&since), since.until), (expected.into(), Some(8)));
+        // A run of its own in between is none of them.
+        let other = goes_on("r5", ("r0", "k", 2), &third[third.find('\n').unwrap() + 1..]);
+        let since = read(&format!("{whole}{other}"), "r1").unwrap();
+        assert_eq!(since, read(whole, "r1").unwrap());
     }
 }

@@ -126,6 +126,52 @@ fn what_came_meanwhile_is_written_together_and_then_answered() {
 }
 
 #[test]
+fn a_journal_goes_on_by_itself_where_nothing_else_is_to_be_written() {
+    let desk = Desk::new();
+    desk.ask("a");
+    desk.disk.send(Err(io::Error::other("no space left"))).unwrap();
+    assert_eq!(desk.outcome(), ("a".into(), Err("no space left".into())));
+    // Once in vain, and then it goes on.
+    desk.disk.send(Err(io::Error::other("no space left"))).unwrap();
+    desk.disk.send(Ok(())).unwrap();
+    while desk.journal.lost().is_some() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    desk.disk.send(Ok(())).unwrap();
+    desk.ask("b");
+    assert_eq!(desk.outcome(), ("b".into(), Ok(())));
+    let (written, told) = desk.finish();
+    assert_eq!(told, [Some("no space left".into()), None]);
+    let (first, rest) = written.split_once('\n').unwrap();
+    assert_eq!(first, r#"{"lost":{"lines":0}}"#);
+    assert!(rest.starts_with(r#"{"id":"b","status":"accepted""#), "{rest}");
+}
+
+#[test]
+fn the_line_about_a_checkpoint_keeps_its_place_where_it_cannot_be_written_at_once() {
+    let desk = Desk::new();
+    desk.journal.note(&end(1));
+    desk.wait_for_write();
+    std::thread::scope(|threads| {
+        let saved = CheckpointNote { id: "k".into(), cycle: 2, time: 0.0 };
+        let saving = threads.spawn(|| desk.journal.checkpoint(saved));
+        desk.disk.send(Ok(())).unwrap();
+        desk.disk.send(Err(io::Error::other("no space left"))).unwrap();
+        saving.join().unwrap();
+    });
+    desk.journal.note(&end(3));
+    desk.disk.send(Ok(())).unwrap();
+    while desk.journal.lost().is_some() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let (written, _) = desk.finish();
+    let cycles = ["\"end\":{\"cycle\":1", "\"checkpoint\":{\"id\":\"k\"", "\"end\":{\"cycle\":3"];
+    let lines: Vec<&str> = written.lines().collect();
+    assert_eq!(lines.len(), 3, "{written}");
+    assert!(lines.iter().zip(cycles).all(|(line, part)| line.contains(part)), "{written}");
+}
+
+#[test]
 fn on_a_full_disk_nothing_is_accepted_and_nothing_else_is_lost() {
     let desk = Desk::new();
     let full = || Err(io::Error::other("no space left"));

@@ -381,27 +381,32 @@ impl Steerer {
         }
     }
 
-    /// Rejects orders that have waited for too long.
+    /// Rejects orders that have waited for too long. Collective where any wait.
     fn reject_overdue(&mut self, moment: Moment) -> bool {
-        // The clocks of several ranks would not agree.
-        if self.worker.is_none() {
+        if self.waiting.is_empty() {
             return false;
         }
         let is_overdue = |task: &Task| {
             task.reservation.as_ref().is_some_and(|reservation| reservation.age() > self.deadline)
         };
-        if !self.waiting.iter().any(is_overdue) {
+        // The clock of rank 0 counts.
+        let mut overdue: Vec<u8> =
+            self.waiting.iter().map(|task| is_overdue(task).into()).collect();
+        self.domain.communicator().broadcast(0, &mut overdue);
+        if overdue.iter().all(|&is_overdue| is_overdue == 0) {
             return false;
         }
         let reason = format!(
             "it has waited for more than {} seconds (steering.deadline)",
             self.deadline.as_secs()
         );
-        let (overdue, waiting) =
-            std::mem::take(&mut self.waiting).into_iter().partition(is_overdue);
-        self.waiting = waiting;
-        let overdue: VecDeque<Task> = overdue;
-        overdue.iter().for_each(|task| self.log.reject(&task.id, moment, &reason.clone().into()));
+        for (task, is_overdue) in std::mem::take(&mut self.waiting).into_iter().zip(overdue) {
+            if is_overdue == 1 {
+                self.log.reject(&task.id, moment, &reason.clone().into());
+            } else {
+                self.waiting.push_back(task);
+            }
+        }
         true
     }
 
