@@ -265,8 +265,9 @@ impl Killed {
         let end = mark + self.random.u64(..(journal.len() - mark) as u64 + 1) as usize;
         let end = journal.floor_char_boundary(end);
         std::fs::write(self.file(), &journal[..end]).unwrap();
+        let whole = journal[..end].rsplit_once('\n').map_or("", |(whole, _)| whole);
         let has = |id: &String| {
-            journal[..end].contains(&format!("{{\"id\":\"{id}\",\"status\":\"accepted\""))
+            whole.contains(&format!("{{\"id\":\"{id}\",\"status\":\"accepted\""))
         };
         self.acknowledged.retain(has);
     }

@@ -139,14 +139,14 @@ impl Adaptor {
         }
     }
 
-    /// The commands whose turn it is. While a restarted run repeats what was done before, new ones wait:
-    /// they would change what the next restart has to repeat.
+    /// The commands whose turn it is. While a restarted run repeats what was done before, new ones wait,
+    /// but for pauses and stops: they would change what is repeated.
     fn take_received(&mut self, moment: Moment) -> VecDeque<Received> {
         let Some(until) = self.resumed.repeats_until(moment.cycle) else {
             self.resumed.puts_off = false;
             return self.queue.take();
         };
-        let urgent = self.queue.take_urgent();
+        let pauses = self.queue.take_pauses();
         let mut put_off = Vec::new();
         self.queue.look(|received| put_off.push(received.id.clone()));
         self.resumed.puts_off = !put_off.is_empty();
@@ -154,7 +154,7 @@ impl Adaptor {
         for id in put_off {
             self.log.update(&id, |order| order.waits_for = Some(reason.clone()));
         }
-        urgent
+        pauses
     }
 
     /// Has the steered mesh made ready for orders once somebody may give one. Collective.

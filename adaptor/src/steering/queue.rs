@@ -119,15 +119,16 @@ impl Queue {
         std::mem::take(&mut *waiting)
     }
 
-    /// What waits and cannot be put off: pauses and stops, for one. The rest is left.
-    pub(crate) fn take_urgent(&self) -> VecDeque<Received> {
+    /// The pauses and stops that wait, and what ends a pause. The rest is left.
+    pub(crate) fn take_pauses(&self) -> VecDeque<Received> {
         let mut waiting = lock(&self.waiting);
         self.attention.store(false, Ordering::Release);
-        let (urgent, rest) = std::mem::take(&mut *waiting)
-            .into_iter()
-            .partition(|received| is_urgent(&received.command));
+        let is_pause = |received: &Received| {
+            matches!(received.command, Command::Pause {} | Command::Resume {} | Command::Stop {})
+        };
+        let (pauses, rest) = std::mem::take(&mut *waiting).into_iter().partition(is_pause);
         *waiting = rest;
-        urgent
+        pauses
     }
 
     /// Does something with all that waits, and leaves it there.
