@@ -102,6 +102,8 @@ pub struct Adaptor {
     /// The directory of the output.
     output: PathBuf,
     mesh: SteeredMesh,
+    /// Why the mesh that this call lends is another one, where the solver says so.
+    replaced: Option<&'static str>,
     lent: Lent,
     /// The step of the last call, and whether there was one.
     moment: Moment,
@@ -294,6 +296,9 @@ impl Adaptor {
         self.moment = moment;
         self.has_begun = true;
         let met = self.meet(moment, fault, entered)?;
+        if let Some(reason) = self.replaced {
+            self.release_shape(reason);
+        }
         self.saved = None;
         let moved = match met {
             Some((called, outside)) => {
@@ -324,6 +329,20 @@ impl Adaptor {
             parameters: self.parameters.take_changed().to_vec(),
             stop: self.stopped,
         })
+    }
+
+    /// As [`execute`](Adaptor::execute), for a mesh whose cells are others than before: with them the
+    /// shape is released for this reason, but only where they pass. To be called on all ranks alike.
+    pub(crate) fn execute_replaced(
+        &mut self,
+        step: &Step,
+        channels: &[Channel<'_>],
+        reason: &'static str,
+    ) -> Result<Steering, ExecuteError> {
+        self.replaced = Some(reason);
+        let steering = self.execute(step, channels);
+        self.replaced = None;
+        steering
     }
 
     /// Whether `execute` will look at the mesh and the fields of this step.
@@ -418,6 +437,7 @@ impl Adaptor {
         self.communicator.size() == 1
             || self.meetings.calls.is_multiple_of(self.config.steering.poll_steps.get().into())
             || self.paused
+            || self.replaced.is_some()
             || !self.waiting_changes.is_empty()
             || !self.resumed.is_over()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest())

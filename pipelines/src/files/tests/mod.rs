@@ -75,7 +75,8 @@ fn one_of_some(dimension: usize, is_chosen: impl Fn(CellType) -> bool) -> Mesh {
             faces: cells.clone(),
         }),
         _ => {
-            FeatureSource::Vertices((0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect())
+            let tags: Vec<i64> = (0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect();
+            FeatureSource::Vertices(tags.into())
         }
     };
     Mesh::new(points, cells, features).unwrap()
