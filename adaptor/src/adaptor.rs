@@ -331,20 +331,6 @@ impl Adaptor {
         })
     }
 
-    /// As [`execute`](Adaptor::execute), for a mesh whose cells are others than before: with them the
-    /// shape is released for this reason, but only where they pass. To be called on all ranks alike.
-    pub(crate) fn execute_replaced(
-        &mut self,
-        step: &Step,
-        channels: &[Channel<'_>],
-        reason: &'static str,
-    ) -> Result<Steering, ExecuteError> {
-        self.replaced = Some(reason);
-        let steering = self.execute(step, channels);
-        self.replaced = None;
-        steering
-    }
-
     /// Whether `execute` will look at the mesh and the fields of this step.
     ///
     /// A solver that would have to copy them first can ask before it does. Where the answer is no,

@@ -8,7 +8,9 @@ mod vtk_files;
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector};
+use tombolo_deform::mesh::{
+    CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, TaggedVertices, Vector,
+};
 
 use super::{Compression, MeshFile, parse_mesh, read_mesh, write_mesh};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
