@@ -216,9 +216,10 @@ impl Run {
             .map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields })
             .collect();
         // The shape is let go of only with a mesh that passes: one that is refused changes nothing.
-        let steering = match is_other {
-            true => adaptor.execute_replaced(&step, &views, OTHER_MESH),
-            false => adaptor.execute(&step, &views),
+        let steering = if is_other {
+            adaptor.execute_replaced(&step, &views, OTHER_MESH)
+        } else {
+            adaptor.execute(&step, &views)
         };
         asked.take(&steering?);
         for channel in &channels {

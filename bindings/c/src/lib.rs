@@ -309,7 +309,11 @@ mod tests {
         let (stop, stopped) =
             unsafe { (|| steps::tombolo_stop(run), || steps::tombolo_stopped(run)) };
         assert_eq!(stopped(), 0);
-        assert_eq!(answer(|| with(run, |_| Ok(assert_eq!((stopped(), stop()), (0, 0))))), 0);
+        let in_a_call = |_: &mut Opened| {
+            assert_eq!((stopped(), stop()), (0, 0));
+            Ok(())
+        };
+        assert_eq!(answer(|| with(run, in_a_call)), 0);
         assert_eq!(stopped(), 1, "it was asked before it began");
         assert_eq!(answer(|| with(run, Opened::end)), 0);
         assert_eq!((stopped(), stop()), (1, WRONG_CALL));

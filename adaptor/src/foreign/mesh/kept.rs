@@ -61,11 +61,12 @@ struct Marks {
 pub(crate) struct Kept {
     /// That of the cells that are kept; `None` where they could not be read to their end.
     fingerprint: Option<Fingerprint>,
-    /// That of the cells which passed last: others are told from these.
-    passed: Option<Fingerprint>,
+    /// That of the cells which passed last, and their generation: others are told from these.
+    passed: Option<(Fingerprint, u64)>,
     counts: (usize, usize),
     address: usize,
     generation: u64,
+    newest_generation: u64,
     cells: Option<Cells>,
     points: Vec<Vector>,
     marks: Marks,
@@ -94,7 +95,7 @@ impl Kept {
         let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
         let fingerprint = channel.fingerprint();
         let is_same = self.fingerprint == Some(fingerprint);
-        let is_other = self.passed.is_some_and(|passed| passed != fingerprint);
+        let is_other = self.passed.is_some_and(|(passed, _)| passed != fingerprint);
         self.counts = counts;
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         if !lent_points || (!is_same && lent_cells.is_none()) {
@@ -110,7 +111,14 @@ impl Kept {
         }
         if !is_same {
             self.fingerprint = None;
-            self.generation += 1;
+            // The cells that are back after others were refused are those that they were.
+            self.generation = match self.passed {
+                Some((passed, generation)) if passed == fingerprint => generation,
+                _ => {
+                    self.newest_generation += 1;
+                    self.newest_generation
+                }
+            };
             self.cells = None;
             self.address = lent_cells.unwrap_or(0);
             // Those that are lent are checked by the adaptor.
@@ -137,7 +145,7 @@ impl Kept {
 
     /// Takes what is kept for what passed: the adaptor has refused none of it.
     pub(crate) fn pass(&mut self) {
-        self.passed = self.fingerprint;
+        self.passed = self.fingerprint.map(|fingerprint| (fingerprint, self.generation));
     }
 
     fn points_of(&self, channel: &Channel<'_>) -> Vec<Vector> {
