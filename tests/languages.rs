@@ -272,6 +272,12 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         {"name": "skin", "channel": "drops", "stages": [{"surface": {}}, {"write": {"file": "skin-{cycle}.vtp"}}]},
         {"name": "last", "channel": "touching", "stages": [{"write": {"file": "last-{cycle}.vtu"}}]}]});
     std::fs::write(&pipelines, watch.to_string()).expect("a file");
+    let half_space =
+        |at: f64, up: i32| json!({"half_space": {"origin": [0, 0, at], "normal": [0, 0, up]}});
+    let press = json!({"region": half_space(0.99, 1), "fixed_region": half_space(0.01, -1), "by": [0, 0, -0.1]});
+    let orders = directory.path().join("orders.json");
+    let order = json!([{"at": {"cycle": 2}, "order": {"edits": [{"translate": press}], "schedule": {"steps": 1}}}]);
+    std::fs::write(&orders, order.to_string()).expect("a file");
     let mut query = Command::new("pkg-config");
     query
         .env("PKG_CONFIG_PATH", built.prefix.join("lib/pkgconfig"))
@@ -284,6 +290,7 @@ fn no_rank_waits_for_one_that_goes_wrong() {
     run.args(["900", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"]).arg(&program);
     run.current_dir(directory.path())
         .env("CATALYST_IMPLEMENTATION_NAME", "tombolo")
+        .env("TOMBOLO_ORDERS", &orders)
         .env("TOMBOLO_PIPELINES", &pipelines);
     let told = succeed(&mut run);
     assert!(

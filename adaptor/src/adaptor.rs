@@ -102,6 +102,8 @@ pub struct Adaptor {
     /// The directory of the output.
     output: PathBuf,
     mesh: SteeredMesh,
+    /// Why the mesh that this call lends is another one, where the solver says so.
+    replaced: Option<&'static str>,
     lent: Lent,
     /// The step of the last call, and whether there was one.
     moment: Moment,
@@ -294,6 +296,9 @@ impl Adaptor {
         self.moment = moment;
         self.has_begun = true;
         let met = self.meet(moment, fault, entered)?;
+        if let Some(reason) = self.replaced {
+            self.release_shape(reason);
+        }
         self.saved = None;
         let moved = match met {
             Some((called, outside)) => {
@@ -424,6 +429,7 @@ impl Adaptor {
         self.communicator.size() == 1
             || self.meetings.calls.is_multiple_of(self.config.steering.poll_steps.get().into())
             || self.paused
+            || self.replaced.is_some()
             || !self.waiting_changes.is_empty()
             || !self.resumed.is_over()
             || matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if !steerer.is_at_rest())

@@ -159,7 +159,7 @@ const MISTAKES: &[Mistake] = {
         of(Lengths, |lent| lent.components = 4, &["4 components", "1 to 3"]),
         of(
             Lengths,
-            |lent| lent.features = FeatureSource::Vertices(vec![1; 63]),
+            |lent| lent.features = FeatureSource::Vertices(vec![1; 63].into()),
             &["63", "64", "vertices"],
         ),
         of(Lengths, |lent| lent.second_name = "solid", &["'solid'", "twice"]),

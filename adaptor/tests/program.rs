@@ -442,7 +442,8 @@ fn a_displacement_file_that_is_wrong_is_named_by_line_and_column() {
 fn refused_on(points: &[[f64; 3]], corners: &[u32], tags: &[i64], edit: &str) -> String {
     let directory = tempfile::tempdir().unwrap();
     let cells = Cells::uniform(CellType::Triangle, corners.to_vec()).unwrap();
-    let mesh = Mesh::new(points.to_vec(), cells, FeatureSource::Vertices(tags.to_vec())).unwrap();
+    let mesh =
+        Mesh::new(points.to_vec(), cells, FeatureSource::Vertices(tags.to_vec().into())).unwrap();
     write_mesh(directory.path().join("box.vtu"), &mesh, &[], Compression::None).unwrap();
     std::fs::write(directory.path().join("edits.json"), format!("[{edit}]")).unwrap();
     let output = tombolo(directory.path(), &EDIT[..7]);

@@ -25,7 +25,7 @@ const MESH: Names = ("mesh", "coords");
 const SURFACE: Names = ("surface", "surface");
 
 /// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many
-/// vertices each has.
+/// vertices each has; none of a rank without data, which is answered with a mesh of no points.
 pub(crate) fn fill(
     node: &mut NodeMut<'_>,
     asked: &Asked,
@@ -41,6 +41,8 @@ pub(crate) fn fill(
     let Some(motion) = &asked.motion else { return };
     let root = format!("catalyst/{channel}");
     let mut first = 0;
+    let without_data = [(String::new(), 0)];
+    let blocks = if blocks.is_empty() { &without_data } else { blocks };
     let is_single = matches!(blocks, [(name, _)] if name.is_empty());
     for (name, count) in blocks {
         let end = first + count;

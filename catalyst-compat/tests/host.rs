@@ -27,7 +27,7 @@ fn compile(directory: &Path, name: &str, exporting: bool) -> PathBuf {
 
 fn run(program: &Path, script: Option<&Path>, environment: &[(&str, &str)]) -> (Output, String) {
     let mut command = Command::new(program);
-    for name in ["PIPELINES", "ORDERS", "OUTPUT", "REPORT"] {
+    for name in ["PIPELINES", "ORDERS", "OUTPUT", "REPORT", "RESTART"] {
         command.env_remove(format!("TOMBOLO_{name}"));
     }
     let output =
@@ -474,4 +474,47 @@ fn results_hold_the_motion_while_there_is_one() {
         line.contains("order 'press': applied, not followed: shape 1 of 2, handed out at cycle 2")
     };
     assert!(errors.lines().count() == 3 && errors.lines().all(said), "{errors}");
+}
+
+/// A directory with a configuration whose orders change the channel `box`, and with these orders.
+fn steered(orders: &str) -> (tempfile::TempDir, PathBuf, String) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let (pipelines, file) =
+        (directory.path().join("pipelines.json"), directory.path().join("orders.json"));
+    let config = r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "channel": "box", "stages": []}]}"#;
+    std::fs::write(&pipelines, config).expect("a file");
+    std::fs::write(&file, orders).expect("a file");
+    (directory, pipelines, file.to_string_lossy().into_owned())
+}
+
+#[test]
+fn a_run_goes_on_from_its_checkpoint_as_if_it_had_not_ended() {
+    let (directory, pipelines, orders) = steered(
+        r#"[{"id": "press", "at": {"cycle": 2}, "order": {
+            "edits": [{"translate": {"region": {"half_space": {"origin": [0, 0, 0.99], "normal": [0, 0, 1]}},
+                "fixed_region": {"half_space": {"origin": [0, 0, 0.01], "normal": [0, 0, -1]}}, "by": [0.03, 0, -0.2]}}],
+            "schedule": {"steps": 3, "every": {"steps": 2}}}},
+        {"at": {"cycle": 10}, "order": {"undo": 1, "schedule": {"steps": 2, "every": {"steps": 1}}}}]"#,
+    );
+    let program = compile(directory.path(), "restart", true);
+    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders)]);
+    assert!(output.status.success(), "{errors}");
+    assert!(directory.path().join("pipelines.json.state").exists());
+}
+
+#[test]
+fn what_the_blueprint_allows_is_taken_for_what_it_is() {
+    let (directory, pipelines, orders) = steered(
+        r#"[{"id": "press", "at": {"cycle": 1}, "order": {
+            "edits": [{"translate": {"features": ["lid"], "by": [0, 0, -0.25]}}], "schedule": {"steps": 1}}}]"#,
+    );
+    let program = compile(directory.path(), "blueprint", true);
+    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders)]);
+    assert!(output.status.success(), "{errors}");
+    for told in [
+        "'catalyst/channels/box/data/fields/fraction' is passed over: it has values of materials alone",
+        "catalyst/channels/box: the global numbers of several blocks are passed over",
+    ] {
+        assert_eq!(errors.matches(told).count(), 1, "{errors}");
+    }
 }

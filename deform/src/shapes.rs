@@ -174,7 +174,7 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
         }
     }
     let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
-    valid(Mesh::new(points, cells, FeatureSource::Vertices(tags)))
+    valid(Mesh::new(points, cells, FeatureSource::Vertices(tags.into())))
 }
 
 /// An open tube of triangles around a polyline of at least 2 points: a mesh of dimension 2, its

@@ -37,8 +37,8 @@ fn editor(mesh: &Mesh) -> Editor {
 
 /// The same mesh with a feature number for each vertex.
 fn tagged(mesh: &Mesh, tag: impl Fn(Vector) -> i64) -> Mesh {
-    let tags = mesh.points().iter().map(|&point| tag(point)).collect();
-    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags))
+    let tags: Vec<i64> = mesh.points().iter().map(|&point| tag(point)).collect();
+    Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags.into()))
         .expect("a mesh")
 }
 

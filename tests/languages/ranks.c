@@ -3,6 +3,7 @@
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 static int rank;
@@ -168,6 +169,11 @@ int main(int argc, char** argv)
   expect("and another", run(step(2)), 0);
   conduit_node* results = conduit_node_create();
   expect("results", (int)catalyst_results(results), 0);
+  /* An order moves the cubes; the rank without one finds a mesh of no points. */
+  const int is_mesh = conduit_node_has_path(results, "catalyst/solid/coordsets/coords/values/x") &&
+    conduit_node_has_path(results, "catalyst/solid/data/fields/displacement/values/z") &&
+    strcmp(conduit_node_fetch_path_as_char8_str(results, "catalyst/solid/type"), "mesh") == 0;
+  expect("a mesh that moves, of every rank", is_mesh, 1);
   const int ended = (int)catalyst_finalize(setup);
   /* Looked for at once, on every rank. */
   const int missing = access("surface-000002.vtp", F_OK) != 0 || access("last-000002.vtu", F_OK) != 0;

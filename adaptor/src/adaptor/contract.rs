@@ -100,13 +100,15 @@ impl Adaptor {
     }
 
     /// The name of the channel whose shape can be changed, where one was taken over: with as many
-    /// vertices as it had.
+    /// vertices as it had. None where it is about to be released.
     fn steered_among<'c>(
         &self,
         step: &Step,
         channels: &[Channel<'c>],
     ) -> Result<Option<&'c str>, ExecuteError> {
-        let SteeredMesh::Steered(steerer, _) = &self.mesh else { return Ok(None) };
+        let (SteeredMesh::Steered(steerer, _), None) = (&self.mesh, self.replaced) else {
+            return Ok(None);
+        };
         let (cycle, expected) = (step.cycle, steerer.vertex_count());
         let channel = Channel::find(channels, self.steered_channel())
             .map_err(|reason| ExecuteError::SteeredChannel { cycle, reason })?;

@@ -185,6 +185,7 @@ impl Adaptor {
             recorder,
             output,
             mesh: SteeredMesh::Unknown,
+            replaced: None,
             lent: Lent::default(),
             moment,
             described: Arc::default(),

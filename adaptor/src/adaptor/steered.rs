@@ -20,7 +20,7 @@ use super::{
 use crate::{
     allocator::give_back_freed,
     error::ExecuteError,
-    steering::{Steerer, clock},
+    steering::{Steerer, Steering, clock},
     step::Step,
     stream::ReferenceSurface,
 };
@@ -45,6 +45,20 @@ impl Adaptor {
         if matches!(self.mesh, SteeredMesh::Steered(..)) {
             self.refuse(reason);
         }
+    }
+
+    /// As [`execute`](Adaptor::execute), for a mesh whose cells are others than before: with them the
+    /// shape is released for this reason, but only where they pass. To be called on all ranks alike.
+    pub(crate) fn execute_replaced(
+        &mut self,
+        step: &Step,
+        channels: &[Channel<'_>],
+        reason: &'static str,
+    ) -> Result<Steering, ExecuteError> {
+        self.replaced = Some(reason);
+        let steering = self.execute(step, channels);
+        self.replaced = None;
+        steering
     }
 
     fn refuse(&mut self, reason: &str) {

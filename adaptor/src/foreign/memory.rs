@@ -4,6 +4,7 @@
 
 use crate::foreign::array::Array;
 use crate::foreign::error::RunError;
+use crate::foreign::mesh::Label;
 
 /// Whether the bytes from `address` on can be read. Where the system will not say, they are taken
 /// to be.
@@ -31,14 +32,13 @@ fn is_readable(_: *const u8, _: usize) -> bool {
 }
 
 /// Refuses an array whose memory cannot be read: its first and last value are looked at. Errors
-/// call it `path`.
-pub(super) fn check(array: &Array<'_>, path: std::fmt::Arguments<'_>) -> Result<(), RunError> {
+/// call it by its `label`.
+pub(super) fn check(array: &Array<'_>, label: impl FnOnce() -> Label) -> Result<(), RunError> {
     let unreadable = |&(address, bytes): &(*const u8, usize)| !is_readable(address, bytes);
     let Some((address, _)) = array.ends().and_then(|ends| ends.into_iter().find(unreadable)) else {
         return Ok(());
     };
-    Err(RunError::wrong(
-        path,
+    Err(label().wrong(
         format_args!("{} values whose memory at {address:p} cannot be read", array.len()),
         "values in the main memory of this process, not in that of a graphics card",
     ))

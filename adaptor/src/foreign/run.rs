@@ -41,6 +41,8 @@ pub struct Run {
     asked: Asked,
     /// The hash of the chosen pipelines' names; 0 where all run.
     choice: u64,
+    /// Whether the last call was refused: what is kept may be half of what it showed.
+    was_refused: bool,
     /// The notes on what is passed over that were logged: each is logged once.
     told: HashSet<String>,
 }
@@ -66,6 +68,7 @@ impl Run {
             time_step: 0.0,
             asked,
             choice: 0,
+            was_refused: false,
             told: HashSet::new(),
         })
     }
@@ -86,10 +89,11 @@ impl Run {
         }
     }
 
-    /// Whether anything is due that looks at the mesh and its fields.
+    /// Whether anything is due that looks at the mesh and its fields, or the last call was refused,
+    /// so that all of the next one is read anew.
     #[must_use]
     pub fn looks_at(&self, step: &Step) -> bool {
-        self.adaptor.looks_at(step)
+        self.adaptor.looks_at(step) || self.was_refused
     }
 
     /// Saves the state of the run in a file: see [`Adaptor::write_checkpoint`]. Collective.
@@ -110,6 +114,11 @@ impl Run {
     #[must_use]
     pub fn watching_link(&self) -> Option<String> {
         self.adaptor.watching_link()
+    }
+
+    /// Ends the steering of the shape: see [`Adaptor::release_shape`]. To be called on all ranks.
+    pub fn release_shape(&mut self, reason: &str) {
+        self.adaptor.release_shape(reason);
     }
 
     /// Asks the solver to end, from any thread.
@@ -161,12 +170,20 @@ impl Run {
     /// rank. Says whether any rank showed a channel; where none did, nothing was done either.
     ///
     /// # Errors
-    /// The mistake in what is given, on any rank: then all ranks have an error.
-    /// [`RunError::Choices`], and what the adaptor refuses.
+    /// The mistake in what is given, on any rank: then all ranks have an error, and are asked for no
+    /// motion. [`RunError::Choices`], and what the adaptor refuses.
     pub fn execute<'call>(
         &mut self,
         given: Result<Shown<'call>, RunError>,
     ) -> Result<bool, RunError> {
+        // What an earlier step asked for is not asked again, whatever becomes of this one.
+        self.asked.rest();
+        let shown = self.show(given);
+        self.was_refused = shown.is_err();
+        shown
+    }
+
+    fn show<'call>(&mut self, given: Result<Shown<'call>, RunError>) -> Result<bool, RunError> {
         // What can be wrong here alone is agreed upon before anything that all do together.
         let mut is_other = false;
         let prepared = self.cover(given).and_then(|Shown { step, looked_at, channels }| {
@@ -178,30 +195,13 @@ impl Run {
         });
         let ((step, mut channels), is_other) =
             ranks::agree_and_ask(&*self.communicator, prepared, is_other, self.choice)?;
-        if is_other {
-            self.adaptor.release_shape(OTHER_MESH);
-        }
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
         self.tell(&channels);
         // A solver that shows nothing yet is asked for nothing.
         if channels.is_empty() {
-            self.asked.rest();
             return Ok(false);
-        }
-        let named = self.adaptor.steered_channel();
-        let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
-        self.steered.clear();
-        self.blocks.clear();
-        if let Some(channel) = steered {
-            self.steered.push_str(&channel.name);
-            self.blocks.extend(
-                channel
-                    .blocks
-                    .iter()
-                    .map(|block: &Block| (block.name.clone(), block.vertex_count())),
-            );
         }
         let Self { adaptor, kept, asked, .. } = self;
         let mut fields: Vec<Vec<FieldView<'_>>> = channels.iter().map(|_| Vec::new()).collect();
@@ -215,10 +215,31 @@ impl Run {
         let views: Vec<extract::Channel<'_>> = parts
             .map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields })
             .collect();
-        // What an earlier step asked for is not asked again.
-        asked.rest();
-        asked.take(&adaptor.execute(&step, &views)?);
+        // The shape is let go of only with a mesh that passes: one that is refused changes nothing.
+        let steering = if is_other {
+            adaptor.execute_replaced(&step, &views, OTHER_MESH)
+        } else {
+            adaptor.execute(&step, &views)
+        };
+        asked.take(&steering?);
+        for channel in &channels {
+            self.kept.get_mut(&channel.name).into_iter().for_each(Kept::pass);
+        }
+        self.note_steered(&channels);
         Ok(true)
+    }
+
+    /// Notes the channel that orders change, and its meshes.
+    fn note_steered(&mut self, channels: &[Channel<'_>]) {
+        let named = self.adaptor.steered_channel();
+        let steered = channels.iter().find(|channel| named.is_none_or(|name| channel.name == name));
+        self.steered.clear();
+        self.blocks.clear();
+        if let Some(channel) = steered {
+            self.steered.push_str(&channel.name);
+            let count = |block: &Block<'_>| (block.name.clone(), block.vertex_count());
+            self.blocks.extend(channel.blocks.iter().map(count));
+        }
     }
 
     fn update(&mut self, channel: &Channel<'_>, looked_at: bool) -> Result<bool, RunError> {
@@ -258,9 +279,15 @@ impl Run {
 
     /// Says once what is passed over.
     fn tell(&mut self, channels: &[Channel<'_>]) {
-        for note in channels.iter().flat_map(|channel| &channel.notes) {
-            if self.communicator.rank() == 0 && self.told.insert(note.clone()) {
-                log::warn!("{note}");
+        if self.communicator.rank() > 0 {
+            return;
+        }
+        for channel in channels {
+            for note in channel.notes.iter().cloned().chain(channel.passed_over()) {
+                if !self.told.contains(&note) {
+                    log::warn!("{note}");
+                    self.told.insert(note);
+                }
             }
         }
     }

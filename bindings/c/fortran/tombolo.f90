@@ -13,10 +13,11 @@
 !
 ! A status other than TOMBOLO_OK is explained by tombolo_message(). Texts are trimmed of blanks at their end.
 !
-! Arrays are lent, not copied: they stay where they are while tombolo_execute runs, and need the attribute `target` (or `pointer`), without
-! which the compiler refuses the call. It refuses expressions, too, which have no place in memory. Never lend a section by a vector of
-! indices, x([1, 3, 5]): it is a copy that ends with the call, which Fortran forbids here and gfortran does not see.
-! Points and fields may be sections with strides, such as x(:, 1:n:2) or x(1, :), of real32 or real64, fields also of int32 or int64.
+! Arrays are lent, not copied: they stay where they are while tombolo_execute runs, and need the attribute `target` (or `pointer`),
+! without which the compiler refuses the call. It refuses expressions, too, which have no place in memory. Never lend a section by a
+! vector of indices, x([1, 3, 5]): it is a copy that ends with the call, which Fortran forbids here and gfortran does not see.
+! Points and fields may be sections with strides, such as x(:, 1:n:2) or x(1, :), of real32 or real64, fields also of int32 or
+! int64.
 ! Connectivities, of int32 or int64, and numbers are contiguous; what is not is an error.
 !
 ! An array that a caller handed to your procedure with an explicit shape may be a copy that ends with the procedure: lend what you
@@ -31,7 +32,7 @@ module tombolo
   integer(c_int), parameter, public :: TOMBOLO_VERTEX = 0, TOMBOLO_CELL = 1
   integer(c_int), parameter, public :: TOMBOLO_INFLOW = 1, TOMBOLO_OUTFLOW = 2, TOMBOLO_WALL = 3
   integer(c_int), parameter, public :: TOMBOLO_POINT = 1, TOMBOLO_LINE = 3, TOMBOLO_TRIANGLE = 5, TOMBOLO_QUAD = 9, &
-    TOMBOLO_TETRA = 10, TOMBOLO_HEXAHEDRON = 12, TOMBOLO_WEDGE = 13, TOMBOLO_PYRAMID = 14
+    TOMBOLO_TETRA = 10, TOMBOLO_HEXAHEDRON = 12, TOMBOLO_WEDGE = 13, TOMBOLO_PYRAMID = 14, TOMBOLO_POLYGON = 7
   integer(c_int), parameter, public :: TOMBOLO_LOG_OFF = 0, TOMBOLO_LOG_ERROR = 1, TOMBOLO_LOG_WARNING = 2, &
     TOMBOLO_LOG_INFO = 3, TOMBOLO_LOG_DEBUG = 4
   ! All ranks where MPI runs, else this process.
@@ -72,8 +73,8 @@ module tombolo
 
   public :: tombolo_version, tombolo_message, tombolo_log
   public :: tombolo_open, tombolo_configure, tombolo_orders, tombolo_orders_file, tombolo_output, tombolo_parameter
-  public :: tombolo_checkpoint, tombolo_restart
-  public :: tombolo_condition, tombolo_start, tombolo_link, tombolo_finalize, tombolo_close, tombolo_report
+  public :: tombolo_checkpoint, tombolo_restart, tombolo_replay_file, tombolo_release_shape, tombolo_stop
+  public :: tombolo_condition, tombolo_start, tombolo_link, tombolo_watching_link, tombolo_finalize, tombolo_close, tombolo_report
   public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
   public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
   public :: tombolo_execute, tombolo_coordinates, tombolo_displacement, tombolo_velocity
@@ -109,7 +110,8 @@ module tombolo
   interface tombolo_global_cells
     procedure global_cells_int32, global_cells_int64
   end interface
-  ! An array of one value for each vertex or cell, an array (components, vertices or cells), or up to three components in an array each.
+  ! An array of one value for each vertex or cell, an array (components, vertices or cells), or up to three components in an array
+  ! each.
   interface tombolo_field
     procedure field_real32, field_real64, field_int32, field_int64
     procedure components_real32, components_real64, components_int32, components_int64
@@ -171,6 +173,12 @@ module tombolo
       character(kind=c_char), intent(in) :: file(*)
       integer(c_int) :: status
     end function
+    function c_replay_file(run, file) bind(C, name="tombolo_replay_file") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: file(*)
+      integer(c_int) :: status
+    end function
     function c_output(run, directory) bind(C, name="tombolo_output") result(status)
       import :: c_char, c_int, c_ptr
       type(c_ptr), value :: run
@@ -211,6 +219,11 @@ module tombolo
       integer(c_int) :: status
     end function
     function c_link(run) bind(C, name="tombolo_link") result(text)
+      import :: c_ptr
+      type(c_ptr), value :: run
+      type(c_ptr) :: text
+    end function
+    function c_watching_link(run) bind(C, name="tombolo_watching_link") result(text)
       import :: c_ptr
       type(c_ptr), value :: run
       type(c_ptr) :: text
@@ -452,6 +465,17 @@ module tombolo
       real(c_double), intent(inout) :: value
       integer(c_int) :: status
     end function
+    function c_release_shape(run, reason) bind(C, name="tombolo_release_shape") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: reason(*)
+      integer(c_int) :: status
+    end function
+    function c_stop(run) bind(C, name="tombolo_stop") result(status)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: run
+      integer(c_int) :: status
+    end function
     function c_stopped(run) bind(C, name="tombolo_stopped") result(stopped)
       import :: c_int, c_ptr
       type(c_ptr), value :: run
@@ -462,10 +486,10 @@ module tombolo
       type(c_ptr), value :: run
       integer(c_size_t) :: count
     end function
-    function c_order(run, index) bind(C, name="tombolo_order") result(text)
-      import :: c_ptr, c_size_t
+    function c_order_by_number(run, number) bind(C, name="tombolo_order_by_number") result(text)
+      import :: c_int64_t, c_ptr
       type(c_ptr), value :: run
-      integer(c_size_t), value :: index
+      integer(c_int64_t), value :: number
       type(c_ptr) :: text
     end function
     function c_length(text) bind(C, name="strlen") result(length)
@@ -577,6 +601,12 @@ contains
     status = c_orders_file(run%handle, c_text(file))
   end function
 
+  integer(c_int) function tombolo_replay_file(run, file) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: file
+    status = c_replay_file(run%handle, c_text(file))
+  end function
+
   integer(c_int) function tombolo_output(run, directory) result(status)
     type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: directory
@@ -629,6 +659,13 @@ contains
     type(tombolo_run), intent(in) :: run
     character(len=:), allocatable :: text
     text = from_c(c_link(run%handle))
+  end function
+
+  ! The link of those who watch and can never drive; empty without a server.
+  function tombolo_watching_link(run) result(text)
+    type(tombolo_run), intent(in) :: run
+    character(len=:), allocatable :: text
+    text = from_c(c_watching_link(run%handle))
   end function
 
   function tombolo_report(run) result(text)
@@ -758,7 +795,8 @@ contains
     real(real32), pointer, intent(in) :: x(:)
     real(real32), pointer, intent(in), optional :: y(:), z(:)
     type(tombolo_table) :: table
-    table = joined([column_real32(x), column_real32(y), column_real32(z)], FLOAT32_TYPE, channel, "field '" // trim(name) // "'", status)
+    table = joined([column_real32(x), column_real32(y), column_real32(z)], FLOAT32_TYPE, channel, &
+      "field '" // trim(name) // "'", status)
     if (status == TOMBOLO_OK) status = lend_field(run, channel, name, association, table)
   end function
 
@@ -826,7 +864,8 @@ contains
     real(real64), pointer, intent(in) :: x(:)
     real(real64), pointer, intent(in), optional :: y(:), z(:)
     type(tombolo_table) :: table
-    table = joined([column_real64(x), column_real64(y), column_real64(z)], FLOAT64_TYPE, channel, "field '" // trim(name) // "'", status)
+    table = joined([column_real64(x), column_real64(y), column_real64(z)], FLOAT64_TYPE, channel, &
+      "field '" // trim(name) // "'", status)
     if (status == TOMBOLO_OK) status = lend_field(run, channel, name, association, table)
   end function
 
@@ -1059,11 +1098,23 @@ contains
     status = c_global_cells_i32(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
   end function
 
+  ! A negative cycle, which C does not have, is refused.
+  integer(c_int) function execute_cycle(run, cycle, time, time_step) result(status)
+    type(tombolo_run), intent(in) :: run
+    integer(c_int64_t), intent(in) :: cycle
+    real(c_double), intent(in) :: time, time_step
+    if (cycle < 0) then
+      status = c_refuse(c_text("cycle"), c_text(text_of(int(cycle, c_size_t))), c_text("a whole number from 0 on"))
+    else
+      status = c_execute(run%handle, cycle, time, time_step)
+    end if
+  end function
+
   integer(c_int) function execute_int32(run, cycle, time, time_step) result(status)
     type(tombolo_run), intent(in) :: run
     integer(int32), intent(in) :: cycle
     real(c_double), intent(in) :: time, time_step
-    status = c_execute(run%handle, int(cycle, c_int64_t), time, time_step)
+    status = execute_cycle(run, int(cycle, c_int64_t), time, time_step)
   end function
 
   integer(c_int) function cells_int64(run, channel, cell_type, connectivity) result(status)
@@ -1137,7 +1188,7 @@ contains
     type(tombolo_run), intent(in) :: run
     integer(int64), intent(in) :: cycle
     real(c_double), intent(in) :: time, time_step
-    status = c_execute(run%handle, int(cycle, c_int64_t), time, time_step)
+    status = execute_cycle(run, int(cycle, c_int64_t), time, time_step)
   end function
 
   ! Where the vertices are to be, (3, vertices); not associated where the mesh stays.
@@ -1208,6 +1259,18 @@ contains
     status = c_parameter_value(run%handle, c_text(name), value)
   end function
 
+  integer(c_int) function tombolo_release_shape(run, reason) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: reason
+    status = c_release_shape(run%handle, c_text(reason))
+  end function
+
+  ! Asks the run to end, from any thread.
+  integer(c_int) function tombolo_stop(run) result(status)
+    type(tombolo_run), intent(in) :: run
+    status = c_stop(run%handle)
+  end function
+
   logical function tombolo_stopped(run)
     type(tombolo_run), intent(in) :: run
     tombolo_stopped = c_stopped(run%handle) /= 0
@@ -1223,6 +1286,6 @@ contains
     type(tombolo_run), intent(in) :: run
     integer, intent(in) :: number
     character(len=:), allocatable :: text
-    text = from_c(c_order(run%handle, int(number, c_size_t) - 1))
+    text = from_c(c_order_by_number(run%handle, int(number, c_int64_t)))
   end function
 end module tombolo

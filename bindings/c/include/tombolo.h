@@ -12,7 +12,7 @@
  *
  * Errors. A function that answers with an int answers TOMBOLO_OK, which is 0, or another status; one that answers with a pointer
  * answers NULL. tombolo_message() then says what is wrong, what was found and what was expected. Nothing was changed, and the solver
- * may go on.
+ * may go on; the mesh stays over a step that tombolo_execute has refused.
  *
  * Arrays are lent, not copied. They are named once, and again where an array has moved in memory; those that were named last are
  * read inside tombolo_execute and at no other time. Each count is one of points, cells or faces, never of numbers or bytes. Counts
@@ -20,10 +20,12 @@
  *
  * Texts that are answered belong to the run and are never cut; each function says how long they are valid.
  *
- * Ranks. On several ranks of MPI all call tombolo_open, tombolo_restart, tombolo_start, tombolo_execute, tombolo_checkpoint,
- * tombolo_finalize and tombolo_close, for the same cycle and with the same files; an error of one rank is that of all.
+ * Ranks. On several ranks of MPI all call tombolo_open, tombolo_restart, tombolo_replay_file, tombolo_start, tombolo_execute,
+ * tombolo_checkpoint, tombolo_release_shape, tombolo_finalize and tombolo_close, for the same cycle and with the same files; an error of
+ * one rank is that of all.
  *
- * Threads. One thread at a time uses a run; another is answered with TOMBOLO_WRONG_CALL, and so is whoever uses a run that was closed. */
+ * Threads. One thread at a time uses a run; another is answered with TOMBOLO_WRONG_CALL, and so is whoever uses a run that was closed.
+ * Any thread may call tombolo_stop and tombolo_stopped, also while another is in a call. */
 #ifndef TOMBOLO_H
 #define TOMBOLO_H
 
@@ -70,7 +72,7 @@ enum tombolo_type
   TOMBOLO_FLOAT64 = 12
 };
 
-/* What a field has one value for. */
+/* What flow does at a feature of the mesh. */
 enum tombolo_boundary
 {
   TOMBOLO_INFLOW = 1,
@@ -78,18 +80,20 @@ enum tombolo_boundary
   TOMBOLO_WALL = 3
 };
 
+/* What a field has one value for. */
 enum tombolo_association
 {
   TOMBOLO_VERTEX = 0,
   TOMBOLO_CELL = 1
 };
 
-/* Types of cells: VTK's numbers, and VTK's order of their vertices. */
+/* Types of cells: VTK's numbers, and VTK's order of their vertices. Polygons are cells of tombolo_mixed_cells alone. */
 enum tombolo_cell_type
 {
   TOMBOLO_POINT = 1,
   TOMBOLO_LINE = 3,
   TOMBOLO_TRIANGLE = 5,
+  TOMBOLO_POLYGON = 7,
   TOMBOLO_QUAD = 9,
   TOMBOLO_TETRA = 10,
   TOMBOLO_HEXAHEDRON = 12,
@@ -129,9 +133,12 @@ int tombolo_log(enum tombolo_level level, tombolo_log_function function, void* u
 int tombolo_open(const char* file, int communicator, tombolo** run);
 /* The pipelines and the server, as JSON; in place of those of a file. */
 int tombolo_configure(tombolo* run, const char* json);
-/* Orders that are carried out at their cycle, as JSON, or a file of them or a journal. */
+/* Orders that are carried out at their cycle, as JSON, or a file of them or a journal. Each call adds to those before. */
 int tombolo_orders(tombolo* run, const char* json);
 int tombolo_orders_file(tombolo* run, const char* file);
+/* Carries out the newest run of a journal again, in place of orders: with the same solver and configuration the same shapes come at the
+ * same cycles, to the bit. What pipelines order meanwhile is passed over, because the journal holds it. */
+int tombolo_replay_file(tombolo* run, const char* file);
 /* The directory of files that pipelines write; else the current one. */
 int tombolo_output(tombolo* run, const char* directory);
 /* A number that can be steered, within its bounds. */
@@ -144,8 +151,10 @@ int tombolo_condition(tombolo* run, const char* feature, int condition);
 int tombolo_restart(tombolo* run, const char* file);
 /* Begins; the first tombolo_execute does so where this was not called. */
 int tombolo_start(tombolo* run);
-/* The link that a browser opens, once the run has begun; NULL without a server. Valid until tombolo_close. */
+/* The link that a browser opens, once the run has begun; NULL without a server. Whoever has it can drive. Valid until tombolo_close. */
 const char* tombolo_link(tombolo* run);
+/* The link of those who watch and can never drive; as tombolo_link. */
+const char* tombolo_watching_link(tombolo* run);
 
 /* ---- The mesh of a channel. Its points come first. The first channel that is named is the one that orders change, or the one that the
  * configuration's pipeline with "on": "order" has as its channel; its vertices and cells stay the same. */
@@ -162,7 +171,7 @@ int tombolo_cells_i32(
   tombolo* run, const char* channel, enum tombolo_cell_type type, const int32_t* connectivity, size_t cells);
 int tombolo_cells_i64(
   tombolo* run, const char* channel, enum tombolo_cell_type type, const int64_t* connectivity, size_t cells);
-/* Cells each of its own type: the type and the number of vertices of each, and `length` vertices in all. */
+/* Cells each of its own type: the type and the number of vertices of each, and `length` vertices in all, which the numbers add up to. */
 int tombolo_mixed_cells_i32(tombolo* run, const char* channel, const unsigned char* types, const int32_t* sizes, size_t cells,
   const int32_t* connectivity, size_t length);
 int tombolo_mixed_cells_i64(tombolo* run, const char* channel, const unsigned char* types, const int64_t* sizes, size_t cells,
@@ -179,7 +188,7 @@ int tombolo_faces_i32(tombolo* run, const char* channel, enum tombolo_cell_type 
   const int32_t* features, size_t faces);
 int tombolo_faces_i64(tombolo* run, const char* channel, enum tombolo_cell_type type, const int64_t* connectivity,
   const int64_t* features, size_t faces);
-/* The name of a feature, which it keeps. Several numbers with one name are one feature. */
+/* The name of a feature, which it keeps, before the channel is shown. Several numbers with one name are one feature. */
 int tombolo_feature(tombolo* run, const char* channel, int64_t number, const char* name);
 
 /* Numbers in the whole mesh, on several ranks. */
@@ -234,7 +243,14 @@ const char* tombolo_motion_order(tombolo* run);
 int tombolo_motion_shape(tombolo* run, unsigned* shape, unsigned* shapes);
 /* The value of a parameter now. */
 int tombolo_parameter_value(tombolo* run, const char* name, double* value);
-/* 1 once the run is to end, else 0; 1 of a run that has ended or is not open. */
+/* Ends the steering of the shape, for a solver that makes another mesh: orders are rejected with this reason from then on, views go on.
+ * tombolo_execute does so by itself where it is shown other cells. */
+int tombolo_release_shape(tombolo* run, const char* reason);
+/* Asks the run to end, as a viewer can: from any thread, such as one that waits for SIGTERM, but not from a signal's handler. A run that is
+ * paused goes on then, and the tombolo_execute that is under way, or the next, says that the run is stopped, on all ranks. It counts on
+ * rank 0. */
+int tombolo_stop(tombolo* run);
+/* 1 once the run is to end, else 0, and 0 while another thread is in a call; 1 of a run that has ended or is not open. */
 int tombolo_stopped(tombolo* run);
 
 /* ---- Orders, on rank 0. */

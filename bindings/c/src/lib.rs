@@ -11,6 +11,7 @@
 //! Of every function: pointers are null or point to what the header says, and arrays that were
 //! named live, unchanged by others, while `tombolo_execute` runs.
 
+mod ending;
 mod export;
 mod lent;
 mod logging;
@@ -29,6 +30,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use tombolo::foreign::{Run, RunError};
 use tombolo::{Report, Settings};
 
+use ending::Ending;
 use export::Text;
 use named::Named;
 
@@ -57,8 +59,11 @@ enum Stage {
 struct Opened {
     stage: Stage,
     channels: Vec<Named>,
+    /// How it is asked to end.
+    ending: Arc<Mutex<Ending>>,
     /// Texts that the caller has the addresses of.
     link: Option<CString>,
+    watching_link: Option<CString>,
     orders: BTreeMap<usize, CString>,
     motion_order: CString,
     report: Option<(Report, CString)>,
@@ -133,11 +138,18 @@ fn value<T>(otherwise: T, call: impl FnOnce() -> Result<T, Fault>) -> T {
     found
 }
 
+/// A run, and what can be asked of it while it is in a call.
+#[derive(Clone)]
+struct Entry {
+    run: Arc<Mutex<Opened>>,
+    ending: Arc<Mutex<Ending>>,
+}
+
 /// The runs that are open, by the numbers that stand for them.
 #[derive(Default)]
 struct Runs {
     last: usize,
-    open: BTreeMap<usize, Arc<Mutex<Opened>>>,
+    open: BTreeMap<usize, Entry>,
 }
 
 static RUNS: Mutex<Runs> = Mutex::new(Runs { last: 0, open: BTreeMap::new() });
@@ -152,29 +164,35 @@ fn register(run: Opened) -> *mut Handle {
     // Distances as between addresses, for whoever looks at the lowest bits of one.
     runs.last += 16;
     let number = runs.last;
-    runs.open.insert(number, Arc::new(Mutex::new(run)));
+    let ending = Arc::clone(&run.ending);
+    runs.open.insert(number, Entry { run: Arc::new(Mutex::new(run)), ending });
     ptr::without_provenance_mut(number)
 }
 
-fn find(run: *mut Handle) -> Result<Arc<Mutex<Opened>>, Fault> {
+fn find(run: *mut Handle) -> Result<Entry, Fault> {
     if run.is_null() {
         return Err(Fault::null("the run"));
     }
-    let known = runs().open.get(&run.addr()).map(Arc::clone);
+    let known = runs().open.get(&run.addr()).cloned();
     known.ok_or_else(|| {
         Fault::Call("the run is not open: it was closed, or never opened by tombolo_open".into())
     })
 }
 
+/// Holds a run for the length of a call; `None` while it is in another.
+fn try_hold(run: &Mutex<Opened>) -> Option<MutexGuard<'_, Opened>> {
+    match run.try_lock() {
+        Ok(held) => Some(held),
+        Err(TryLockError::Poisoned(held)) => Some(held.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
+    }
+}
+
 /// Holds a run for the length of a call.
 fn hold(run: &Mutex<Opened>) -> Result<MutexGuard<'_, Opened>, Fault> {
-    match run.try_lock() {
-        Ok(held) => Ok(held),
-        Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
-        Err(TryLockError::WouldBlock) => {
-            Err(Fault::Call("the run is in another call; one thread at a time can use it".into()))
-        }
-    }
+    try_hold(run).ok_or_else(|| {
+        Fault::Call("the run is in another call; one thread at a time can use it".into())
+    })
 }
 
 /// Does something with an open run.
@@ -182,14 +200,22 @@ fn with<T>(
     run: *mut Handle,
     call: impl FnOnce(&mut Opened) -> Result<T, Fault>,
 ) -> Result<T, Fault> {
-    let run = find(run)?;
-    call(&mut *hold(&run)?)
+    let entry = find(run)?;
+    call(&mut *hold(&entry.run)?)
 }
 
 impl Opened {
     fn new(stage: Stage) -> Self {
-        let (link, motion_order, report) = (None, CString::default(), None);
-        Self { stage, channels: Vec::new(), link, orders: BTreeMap::new(), motion_order, report }
+        Self {
+            stage,
+            channels: Vec::new(),
+            ending: Arc::default(),
+            link: None,
+            watching_link: None,
+            orders: BTreeMap::new(),
+            motion_order: CString::default(),
+            report: None,
+        }
     }
 
     fn settings(&mut self) -> Result<&mut Settings, Fault> {
@@ -274,6 +300,25 @@ mod tests {
         assert_eq!(answer(|| with(run, |_| Ok(()))), 0);
         runs().open.remove(&run.addr());
         assert_eq!(answer(|| with(run, |_| Ok(()))), WRONG_CALL);
+    }
+
+    #[test]
+    fn a_run_in_a_call_can_be_asked_to_end_and_goes_on() {
+        let run = register(Opened::new(Stage::Opened(Box::default())));
+        // SAFETY: the handle is that of an open run.
+        let (stop, stopped) =
+            unsafe { (|| steps::tombolo_stop(run), || steps::tombolo_stopped(run)) };
+        assert_eq!(stopped(), 0);
+        let in_a_call = |_: &mut Opened| {
+            assert_eq!((stopped(), stop()), (0, 0));
+            Ok(())
+        };
+        assert_eq!(answer(|| with(run, in_a_call)), 0);
+        assert_eq!(stopped(), 1, "it was asked before it began");
+        assert_eq!(answer(|| with(run, Opened::end)), 0);
+        assert_eq!((stopped(), stop()), (1, WRONG_CALL));
+        runs().open.remove(&run.addr());
+        assert_eq!((stopped(), stop()), (1, WRONG_CALL));
     }
 
     #[test]

@@ -81,7 +81,13 @@ fn fixed_cell(what: &str, number: c_int) -> Result<(CellType, usize), Fault> {
         .and_then(CellType::from_vtk)
         .and_then(|cell_type| Some((cell_type, cell_type.vertex_count()?)))
         .ok_or_else(|| {
-            Fault::invalid(what, format!("the cell type {number}"), "one of enum tombolo_cell_type")
+            let expected = match u8::try_from(number).ok().and_then(CellType::from_vtk) {
+                Some(CellType::Polygon) => {
+                    "a type whose cells have equally many vertices; polygons are cells of tombolo_mixed_cells"
+                }
+                _ => "one of enum tombolo_cell_type",
+            };
+            Fault::invalid(what, format!("the cell type {number}"), expected)
         })
 }
 

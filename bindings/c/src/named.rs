@@ -2,7 +2,7 @@
 
 use tombolo::deform::mesh::CellType;
 use tombolo::foreign::mesh::{
-    Block, Channel, Coordset, Domain, Faces, Field, Mask, Roles, Rows, Topology,
+    Block, Channel, Coordset, Domain, Faces, Field, Label, Mask, Roles, Rows, Topology,
 };
 use tombolo::foreign::{Array, RunError};
 use tombolo::pipelines::extract::{Association, check_field_length};
@@ -65,6 +65,8 @@ impl Named {
         self.faces.push((cell_type, connectivity, features));
     }
 
+    /// Names a feature, which has to be done before the channel is shown: its features are found
+    /// then.
     pub(super) fn feature(&mut self, number: i64, name: String) -> Result<(), Fault> {
         match self.features.iter().find(|(known, _)| *known == number) {
             Some((_, known)) if *known != name => Err(Fault::invalid(
@@ -73,6 +75,11 @@ impl Named {
                 format!("'{known}', as it was named before"),
             )),
             Some(_) => Ok(()),
+            None if self.is_shown => Err(Fault::invalid(
+                format!("channel '{}', feature {number}", self.name),
+                format!("the name '{name}' after tombolo_execute has shown the channel"),
+                "all names before the first tombolo_execute",
+            )),
             None => {
                 self.features.push((number, name));
                 Ok(())
@@ -114,12 +121,13 @@ impl Named {
                 "tombolo_faces, with 0 faces on a rank that has none",
             ));
         }
-        let path = format!("channel '{}'", self.name);
+        let label = Label::Words(format!("channel '{}'", self.name));
+        let part = |name: &str| label.part(name, name);
         let coordset = Coordset::Explicit { axes: self.points.iter().map(array).collect() };
         let uniform = |what: &str, cell_type: CellType, connectivity: &Address| Topology::Uniform {
             cell_type,
             connectivity: array(connectivity),
-            path: format!("{path}, {what}"),
+            label: part(what),
         };
         let topology = match cells {
             Cells::Points => Topology::Points(coordset.vertex_count()),
@@ -129,16 +137,12 @@ impl Named {
                     .into_iter()
                     .filter(|cell_type| *cell_type != CellType::Polyhedron);
                 Topology::Mixed {
-                    cells: Rows::new(
-                        array(connectivity),
-                        array(sizes),
-                        None,
-                        format!("{path}, cells"),
-                    ),
+                    cells: Rows::new(array(connectivity), array(sizes), None, part("cells")),
                     shapes: array(types),
                     map: map.map(|cell_type| (i64::from(cell_type.vtk()), cell_type)).collect(),
                     faces: None,
-                    path: format!("{path}, cell types"),
+                    label: part("cell types"),
+                    expected: "one of enum tombolo_cell_type",
                 }
             }
         };
@@ -169,13 +173,13 @@ impl Named {
                 global_cells: self.global_cells.as_ref().map(array),
                 vertex_features: None,
             },
-            path: path.clone(),
+            label: label.clone(),
         };
         Ok(Channel {
             name: self.name.clone(),
             blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
             feature_names: self.features.clone(),
-            path,
+            label,
             ..Channel::default()
         })
     }

@@ -9,6 +9,7 @@ use tombolo::foreign::{Run, RunError, ranks};
 use tombolo::pipelines::language;
 use tombolo::{Condition, Parameter, Restart, Settings};
 
+use crate::ending::Ending;
 use crate::export::{Out, Text, export};
 use crate::{Fault, Handle, Opened, Stage, c_string, find, hold, register, runs, with};
 
@@ -58,7 +59,7 @@ export! {
     fn tombolo_orders(run: *mut Handle, json: Text) {
         let json = json.get("json")?;
         set(run, |settings| {
-            settings.orders = language::check_orders(&json, "orders")?;
+            settings.orders.extend(language::check_orders(&json, "orders")?);
             Ok(())
         })
     }
@@ -66,7 +67,15 @@ export! {
     fn tombolo_orders_file(run: *mut Handle, file: Text) {
         let file = file.get("file")?;
         set(run, |settings| {
-            settings.orders = Settings::default().orders_from_file(&file)?.orders;
+            settings.orders.extend(Settings::default().orders_from_file(&file)?.orders);
+            Ok(())
+        })
+    }
+
+    fn tombolo_replay_file(run: *mut Handle, file: Text) {
+        let file = file.get("file")?;
+        set(run, |settings| {
+            settings.replay = Settings::default().replay_from_file(&file)?.replay;
             Ok(())
         })
     }
@@ -126,6 +135,13 @@ export! {
         })
     }
 
+    fn tombolo_watching_link(run: *mut Handle) -> (*const c_char = ptr::null()) {
+        with(run, |run| {
+            run.under_way()?;
+            Ok(run.watching_link.as_ref().map_or(ptr::null(), |link| link.as_ptr()))
+        })
+    }
+
     fn tombolo_finalize(run: *mut Handle) {
         with(run, Opened::end)
     }
@@ -143,7 +159,7 @@ export! {
             return Ok(());
         }
         let opened = find(*run)?;
-        let mut held = hold(&opened)?;
+        let mut held = hold(&opened.run)?;
         runs().open.remove(&run.addr());
         *run = ptr::null_mut();
         if matches!(held.stage, Stage::Ended) { Ok(()) } else { held.end() }
@@ -156,6 +172,8 @@ impl Opened {
         if let Stage::Opened(settings) = &self.stage {
             let run = Run::new((**settings).clone())?;
             self.link = run.link().map(|link| c_string(&link));
+            self.watching_link = run.watching_link().map(|link| c_string(&link));
+            Ending::of(&self.ending).begin(run.stopper());
             self.stage = Stage::UnderWay(Box::new(run));
         }
         match &mut self.stage {
@@ -165,7 +183,8 @@ impl Opened {
     }
 
     /// Ends. Collective.
-    fn end(&mut self) -> Result<(), Fault> {
+    pub(super) fn end(&mut self) -> Result<(), Fault> {
+        *Ending::of(&self.ending) = Ending::Ended;
         match std::mem::replace(&mut self.stage, Stage::Ended) {
             Stage::UnderWay(run) => {
                 let (report, ended) = run.finalize();

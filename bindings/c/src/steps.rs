@@ -8,8 +8,9 @@ use tombolo::foreign::Shown;
 use tombolo::pipelines::language::nearest;
 use tombolo::{ExecuteError, MeshMotion, OrderReport, Step};
 
+use crate::ending::Ending;
 use crate::export::{Out, Text, export};
-use crate::{Fault, Handle, Opened, Stage, c_string, with};
+use crate::{Fault, Handle, Opened, Stage, c_string, find, try_hold, with};
 
 /// Something of the motion that is asked for; `none` where the mesh stays.
 fn motion<T>(
@@ -133,12 +134,28 @@ export! {
         })
     }
 
+    fn tombolo_release_shape(run: *mut Handle, reason: Text) {
+        let reason = reason.name("the reason")?;
+        with(run, |run| {
+            run.under_way()?;
+            run.begin()?.release_shape(&reason);
+            Ok(())
+        })
+    }
+
+    fn tombolo_stop(run: *mut Handle) {
+        Ending::of(&find(run)?.ending).ask()
+    }
+
     fn tombolo_stopped(run: *mut Handle) -> (c_int = 1) {
+        let entry = find(run)?;
+        // Another thread is in a call, perhaps in one that waits: the run goes on.
+        let Some(run) = try_hold(&entry.run) else { return Ok(0) };
         // A solver whose run is not there any more is not to go on for ever.
-        with(run, |run| match &run.stage {
-            Stage::Opened(_) => Ok(0),
-            Stage::UnderWay(under_way) => Ok(c_int::from(under_way.asked().stop)),
-            Stage::Ended => Ok(1),
+        Ok(match &run.stage {
+            Stage::Opened(_) => c_int::from(Ending::of(&entry.ending).is_asked()),
+            Stage::UnderWay(under_way) => c_int::from(under_way.asked().stop),
+            Stage::Ended => 1,
         })
     }
 
@@ -147,23 +164,44 @@ export! {
     }
 
     fn tombolo_order(run: *mut Handle, index: usize) -> (*const c_char = ptr::null()) {
-        with(run, |run| {
-            let orders = orders(run);
-            let order = orders.get(index).ok_or_else(|| {
-                let expected = match orders.len() {
-                    0 => "no index, as there are no orders".into(),
-                    count => format!("an index from 0 to {}", count - 1),
-                };
-                Fault::invalid("order", index, expected)
-            })?;
-            let text = c_string(&serde_json::to_string(order).unwrap_or_default());
-            // A caller may hold the address of the text that was given before: it is replaced only
-            // where the order went on.
-            let kept = run.orders.entry(index).or_default();
-            if *kept != text {
-                *kept = text;
-            }
-            Ok(kept.as_ptr())
+        order(run, Some(index), |count| {
+            let expected = match count {
+                0 => "no index, as there are no orders".into(),
+                _ => format!("an index from 0 to {}", count - 1),
+            };
+            Fault::invalid("order", index, expected)
         })
     }
+
+    fn tombolo_order_by_number(run: *mut Handle, number: i64) -> (*const c_char = ptr::null()) {
+        let index = number.checked_sub(1).and_then(|index| usize::try_from(index).ok());
+        order(run, index, |count| {
+            let expected = match count {
+                0 => "no number, as there are no orders".into(),
+                _ => format!("a number from 1 to {count}"),
+            };
+            Fault::invalid("order", number, expected)
+        })
+    }
+}
+
+/// What became of the order at this index, as a text; `missing` says of how many orders it is none.
+fn order(
+    run: *mut Handle,
+    index: Option<usize>,
+    missing: impl FnOnce(usize) -> Fault,
+) -> Result<*const c_char, Fault> {
+    with(run, |run| {
+        let orders = orders(run);
+        let found = index.and_then(|index| Some((index, orders.get(index)?)));
+        let (index, order) = found.ok_or_else(|| missing(orders.len()))?;
+        let text = c_string(&serde_json::to_string(order).unwrap_or_default());
+        // A caller may hold the address of the text that was given before: it is replaced only
+        // where the order went on.
+        let kept = run.orders.entry(index).or_default();
+        if *kept != text {
+            *kept = text;
+        }
+        Ok(kept.as_ptr())
+    })
 }

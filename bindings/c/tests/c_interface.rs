@@ -87,19 +87,17 @@ fn every_function_of_the_header_is_exported_and_the_other_way_round() {
     );
     for name in &exported {
         // Of the Fortran module alone.
-        let is_own = matches!(*name, "tombolo_refuse" | "tombolo_vertices_of_cell");
+        let is_own = matches!(
+            *name,
+            "tombolo_refuse" | "tombolo_vertices_of_cell" | "tombolo_order_by_number"
+        );
         assert_eq!(
             header.contains(&format!(" {name}(")) || header.contains(&format!("* {name}(")),
             !is_own,
             "{name}"
         );
     }
-    let declared = header
-        .lines()
-        .filter(|line| ["int ", "const ", "size_t "].iter().any(|it| line.starts_with(it)));
-    for line in declared {
-        let name =
-            line.split('(').next().and_then(|before| before.rsplit(' ').next()).unwrap_or_default();
+    for name in declared(&header) {
         assert!(exported.contains(&name), "{name}");
     }
 }
@@ -139,6 +137,69 @@ fn a_solver_can_take_the_motion_of_the_boundary_alone() {
     let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/surface.c"));
     assert_eq!(succeed(&mut Command::new(&program)), "");
     succeed(&mut under_valgrind(&program));
+}
+
+#[test]
+fn a_refused_step_leaves_nothing_behind() {
+    let directory = installed();
+    let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/recovers.c"));
+    succeed(Command::new(&program).current_dir(directory.path()));
+}
+
+#[test]
+fn a_run_goes_on_from_its_checkpoint_as_if_it_had_not_ended() {
+    let directory = installed();
+    let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/restart.c"));
+    assert_eq!(succeed(Command::new(&program).current_dir(directory.path())), "");
+    succeed(under_valgrind(&program).current_dir(directory.path()));
+    let program = fortran(directory.path(), &project().join("bindings/c/tests/restart.f90"))
+        .unwrap_or_else(|told| panic!("{told}"));
+    assert_eq!(succeed(Command::new(&program).current_dir(directory.path())), "");
+}
+
+/// The functions that the header declares.
+fn declared(header: &str) -> Vec<&str> {
+    let lines = header
+        .lines()
+        .filter(|line| ["int ", "const ", "size_t "].iter().any(|it| line.starts_with(it)));
+    lines
+        .filter_map(|line| line.split('(').next().and_then(|before| before.rsplit(' ').next()))
+        .collect()
+}
+
+#[test]
+fn the_fortran_module_has_what_the_header_has_in_lines_that_every_compiler_takes() {
+    let read = |file: &str| {
+        std::fs::read_to_string(project().join("bindings/c").join(file)).expect("a file")
+    };
+    let (header, module) = (read("include/tombolo.h"), read("fortran/tombolo.f90"));
+    let public: Vec<&str> = module
+        .lines()
+        .filter_map(|line| line.trim_start().strip_prefix("public :: "))
+        .flat_map(|names| names.split(", "))
+        .collect();
+    // How many vertices there are is the size of an array.
+    let sizes = ["tombolo_motion_count", "tombolo_surface_count"];
+    for name in declared(&header).into_iter().filter(|name| !sizes.contains(name)) {
+        let kinds = ["_f32", "_f64", "_i32", "_i64", "_u8", "_strided"];
+        let generic = kinds.iter().find_map(|kind| name.strip_suffix(kind)).unwrap_or(name);
+        assert!(public.contains(&generic), "{name}");
+    }
+    // The types of numbers are those of the arrays.
+    let types = ["INT", "UINT", "FLOAT"].map(|kind| format!("  TOMBOLO_{kind}"));
+    for line in header.lines().filter(|line| line.starts_with("  TOMBOLO_")) {
+        let value = line.trim_start().split([',', '/']).next().unwrap_or_default().trim_end();
+        let is_type = types.iter().any(|kind| line.starts_with(kind));
+        let is_there = is_type
+            || module.lines().any(|line| {
+                let mut words = line.split([',', '&']).flat_map(|part| part.rsplit("::").next());
+                words.any(|word| word.trim() == value)
+            });
+        assert!(is_there, "{value}");
+    }
+    for line in module.lines() {
+        assert!(line.len() <= 132, "{line}");
+    }
 }
 
 /// A Fortran program; `Err` with what the compiler says.

@@ -71,6 +71,7 @@ static void without_a_run(tombolo* run, const char* words)
   double value = 7.0;
   WRONG(tombolo_configure(run, "{}"), words);
   WRONG(tombolo_orders(run, "[]"), words);
+  WRONG(tombolo_replay_file(run, "journal.jsonl"), words);
   WRONG(tombolo_output(run, "."), words);
   WRONG(tombolo_parameter(run, "p", 0.0, 0.0, 1.0), words);
   WRONG(tombolo_start(run), words);
@@ -100,7 +101,10 @@ static void without_a_run(tombolo* run, const char* words)
   WRONG(tombolo_motion_shape(run, &shape, &shapes), words);
   WRONG(tombolo_parameter_value(run, "p", &value), words);
   WRONG(tombolo_finalize(run), words);
+  WRONG(tombolo_release_shape(run, "another mesh"), words);
+  WRONG(tombolo_stop(run), words);
   NONE(tombolo_link(run) != NULL, words);
+  NONE(tombolo_watching_link(run) != NULL, words);
   NONE(tombolo_coordinates(run) != NULL, words);
   NONE(tombolo_displacement(run) != NULL, words);
   NONE(tombolo_velocity(run) != NULL, words);
@@ -141,12 +145,16 @@ static void pointers_and_times(void)
   WRONG(tombolo_orders_file(run, NULL), "file is a null pointer");
   INVALID(tombolo_orders_file(run, "no-such-file.json"), "no-such-file.json: No such file");
   INVALID(tombolo_orders(run, "[{\"at\": {}}]"), "orders");
+  WRONG(tombolo_replay_file(run, NULL), "file is a null pointer");
+  INVALID(tombolo_replay_file(run, "no-such-file.jsonl"), "no-such-file.jsonl: No such file");
   WRONG(tombolo_output(run, NULL), "directory is a null pointer");
   WRONG(tombolo_parameter(run, NULL, 0.0, 0.0, 1.0), "the parameter's name is a null pointer");
   INVALID(tombolo_parameter(run, "", 0.0, 0.0, 1.0), "the parameter's name: found \"\"");
   NONE(tombolo_report(run) != NULL, "called before tombolo_finalize");
   NONE(tombolo_coordinates(run) != NULL, "called before the run began");
   NONE(tombolo_link(run) != NULL, "called before the run began");
+  NONE(tombolo_watching_link(run) != NULL, "called before the run began");
+  WRONG(tombolo_release_shape(run, "another mesh"), "called before the run began");
   OK(tombolo_parameter(run, "heating", 2.0, 0.0, 10.0));
   WRONG(tombolo_condition(run, NULL, TOMBOLO_WALL), "the feature's name is a null pointer");
   INVALID(tombolo_condition(run, "z-min", 9), "condition: found 9; expected TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL");
@@ -156,6 +164,9 @@ static void pointers_and_times(void)
   WRONG(tombolo_configure(run, "{\"version\": 1}"), "called after the run began");
   WRONG(tombolo_parameter(run, "late", 0.0, 0.0, 1.0), "called after the run began");
   WRONG(tombolo_condition(run, "z-min", TOMBOLO_INFLOW), "called after the run began");
+  WRONG(tombolo_replay_file(run, "journal.jsonl"), "called after the run began");
+  WRONG(tombolo_release_shape(run, NULL), "the reason is a null pointer");
+  INVALID(tombolo_release_shape(run, ""), "the reason: found \"\"");
   double value = 7.0;
   INVALID(tombolo_parameter_value(run, "heatng", &value), "parameter: found 'heatng'; expected one that tombolo_parameter declared; did you mean 'heating'?");
   WRONG(tombolo_parameter_value(run, "heating", NULL), "value is a null pointer");
@@ -207,6 +218,7 @@ static void arguments(void)
   AT_ONCE(TOMBOLO_INVALID, tombolo_field_f64(run, "fluid-before-its-mesh", "f", TOMBOLO_VERTEX, warm, 5, 1), "expected one that tombolo_points has named: solid");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", (enum tombolo_cell_type)99, tets, 2), "found the cell type 99; expected one of enum tombolo_cell_type");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", (enum tombolo_cell_type)-1, tets, 2), "found the cell type -1");
+  AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", TOMBOLO_POLYGON, tets, 2), "found the cell type 7; expected a type whose cells have equally many vertices; polygons are cells of tombolo_mixed_cells");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, NULL, 2), "the address of 8 values");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, (size_t)-2), "as many as memory can hold");
   AT_ONCE(TOMBOLO_INVALID, tombolo_cells_i64(run, "solid", TOMBOLO_TETRA, numbers, SIZE_MAX / 4), "as many as memory can hold");
@@ -234,7 +246,11 @@ static void arrays(void)
   static int32_t beyond[8] = { 0, 1, 2, 3, 1, 5, 2, 3 }, negative[8] = { 0, 1, 2, 3, 1, -4, 2, 3 };
   static double infinite[15] = { 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, INFINITY, 1 };
   static int32_t nowhere[18] = { 0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 4, 1, 3, 4, 0, 1, 4 }, lid[6] = { 1, 1, 7, 2, 2, 2 };
-  static unsigned char ghosts[2] = { 0, 0 };
+  static unsigned char ghosts[2] = { 0, 0 }, unknown[2] = { TOMBOLO_TETRA, 21 }, types[2] = { TOMBOLO_TETRA, TOMBOLO_TETRA };
+  static unsigned char polygon[1] = { TOMBOLO_POLYGON };
+  static int32_t sizes[2] = { 4, 4 }, longer[12] = { 0, 1, 2, 3, 1, 4, 2, 3, 0, 1, 2, 3 }, five[1] = { 5 }, corners[5] = { 0, 1, 4, 2, 3 };
+  static int64_t below[5] = { 0, 1, 2, 3, -4 };
+  void* const nowhere_in_memory = (void*)4096;
 
   AT_EXECUTE(tombolo_points_f64(run, "sold", points, 5), "channel 'sold': found points without cells; expected tombolo_cells", tombolo_point_cells(run, "sold"));
   AT_EXECUTE(tombolo_field_f64(run, "solid", "warm", TOMBOLO_CELL, warm, 5, 1), "warm", tombolo_field_f64(run, "solid", "warm", TOMBOLO_VERTEX, warm, 5, 1));
@@ -250,7 +266,22 @@ static void arrays(void)
   AT_EXECUTE(tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, nowhere, features, 6), "channel 'solid': face 5 of those with features (2, vertices 0, 1, 4) is no face of any cell", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, features, 6));
   AT_EXECUTE(tombolo_feature(run, "solid", 7, "lid"), "feature 'lid' has the number 7, which no face has; the faces have 1, 2", tombolo_faces_i32(run, "solid", TOMBOLO_TRIANGLE, triangles, lid, 6));
 
-  tombolo* run = NULL;
+  AT_EXECUTE(tombolo_points_f64(run, "solid", nowhere_in_memory, 5), "channel 'solid', points: found 5 values whose memory at", tombolo_points_f64(run, "solid", points, 5));
+  AT_EXECUTE(tombolo_ghost_cells(run, "solid", nowhere_in_memory, 2), "channel 'solid', ghost cells: found 2 values whose memory at", tombolo_ghost_cells(run, "solid", ghosts, 2));
+  AT_EXECUTE(tombolo_global_vertices_i64(run, "solid", nowhere_in_memory, 5), "channel 'solid', global vertices: found 5 values whose memory at", tombolo_global_vertices_i64(run, "solid", numbers, 5));
+  AT_EXECUTE(tombolo_global_cells_i64(run, "solid", nowhere_in_memory, 2), "channel 'solid', global cells: found 2 values whose memory at", tombolo_global_cells_i64(run, "solid", numbers, 2));
+  AT_EXECUTE(tombolo_global_vertices_i64(run, "solid", below, 5), "channel 'solid', global vertices: found the number -4 at entry 4; expected whole numbers from 0 on", tombolo_global_vertices_i64(run, "solid", numbers, 5));
+  AT_EXECUTE(tombolo_mixed_cells_i32(run, "solid", unknown, sizes, 2, tets, 8), "channel 'solid', cell types: found 21 at entry 1; expected one of enum tombolo_cell_type", tombolo_mixed_cells_i32(run, "solid", types, sizes, 2, tets, 8));
+  AT_EXECUTE(tombolo_mixed_cells_i32(run, "solid", types, sizes, 2, longer, 12), "channel 'solid', cells, connectivity: found 12 entries, of which the rows have 8; expected as many as the sizes add up to", tombolo_mixed_cells_i32(run, "solid", types, sizes, 2, longer, 8));
+
+  tombolo* run = good();
+  OK(tombolo_points_f64(run, "plate", points, 5));
+  OK(tombolo_mixed_cells_i32(run, "plate", polygon, five, 1, corners, 5));
+  OK(tombolo_execute(run, 0, 0.0, 0.1));
+  OK(tombolo_feature(run, "solid", 1, "low"));
+  INVALID(tombolo_feature(run, "solid", 2, "late"), "channel 'solid', feature 2: found the name 'late' after tombolo_execute has shown the channel; expected all names before");
+  OK(tombolo_close(&run));
+
   OK(tombolo_open(NULL, TOMBOLO_COMM_WORLD, &run));
   OK(tombolo_points_f64(run, "solid", points, 5));
   OK(tombolo_cells_i32(run, "solid", TOMBOLO_TETRA, tets, 2));

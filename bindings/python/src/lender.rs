@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
 use tombolo::deform::mesh::{CellType, Vector};
 use tombolo::foreign::mesh::{
-    Block, COMPONENTS, Channel, Coordset, Domain, Faces, Field, Lending, Mask, Roles, Rows,
+    Block, COMPONENTS, Channel, Coordset, Domain, Faces, Field, Label, Lending, Mask, Roles, Rows,
     Topology,
 };
 use tombolo::foreign::{Array, NumberType, RunError};
@@ -204,7 +204,7 @@ impl Lender {
         }
         // SAFETY: as in `list`.
         let connectivity = unsafe { layout.table() };
-        Ok(Topology::Uniform { cell_type, connectivity, path: what })
+        Ok(Topology::Uniform { cell_type, connectivity, label: Label::Words(what) })
     }
 
     /// Cells: by their types, or as VTK has them.
@@ -240,11 +240,12 @@ impl Lender {
             }
             let map = CellType::ALL.into_iter().filter(|of| *of != CellType::Polyhedron);
             return Ok(Topology::Mixed {
-                cells: Rows::between(connectivity, offsets, what.to_owned()),
+                cells: Rows::between(connectivity, offsets, Label::Words(what.to_owned())),
                 shapes: types,
                 map: map.map(|cell_type| (i64::from(cell_type.vtk()), cell_type)).collect(),
                 faces: None,
-                path: format!("{what}, types"),
+                label: Label::Words(format!("{what}, types")),
+                expected: "VTK's number of a type of linear cells",
             });
         }
         if let [[key, value]] = &entries[..] {
@@ -388,12 +389,13 @@ impl Lender {
             global_cells: list("global_cells")?,
             vertex_features: list("vertex_features")?,
         };
-        let domain = Domain { coordset, topology, fields, faces, roles, path: path.clone() };
+        let label = Label::Words(path);
+        let domain = Domain { coordset, topology, fields, faces, roles, label: label.clone() };
         Ok(Channel {
             name: channel,
             blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
             feature_names,
-            path,
+            label,
             ..Channel::default()
         })
     }

@@ -1,7 +1,7 @@
 //! A channel's node: one mesh, several blocks, or overlapping grids.
 
 use tombolo::foreign::RunError;
-use tombolo::foreign::mesh::{Block, Channel, Grid, Mask, Topology};
+use tombolo::foreign::mesh::{Block, Channel, Grid, Label, Mask, Topology};
 
 use super::{amr, domain, field};
 use crate::node::{Kind, Node};
@@ -14,8 +14,11 @@ pub(crate) fn read<'call>(
     node: &Node<'_, 'call>,
     looked_at: bool,
 ) -> Result<Channel<'call>, RunError> {
-    let mut channel =
-        Channel { name: node.name().into_owned(), path: node.path(), ..Channel::default() };
+    let mut channel = Channel {
+        name: node.name().into_owned(),
+        label: Label::Path(node.path()),
+        ..Channel::default()
+    };
     // A rank without data may leave its channel empty.
     if node.kind() == Kind::Empty {
         return Ok(channel);
@@ -67,7 +70,7 @@ fn push<'call>(
     has_levels: bool,
     looked_at: bool,
 ) -> Result<(), RunError> {
-    let Some(domain) = domain::read(node, looked_at)? else { return Ok(()) };
+    let Some(domain) = domain::read(node, looked_at, &mut channel.notes)? else { return Ok(()) };
     let mut mask = Mask::default();
     if has_levels {
         if let Topology::Grid { cells } = &domain.topology {

@@ -3,7 +3,7 @@
 use std::ffi::CString;
 
 use tombolo::foreign::RunError;
-use tombolo::foreign::mesh::{Domain, Faces, Field, Roles, Topology};
+use tombolo::foreign::mesh::{Domain, Faces, Field, Label, Roles, Topology};
 use tombolo::pipelines::extract::{Association, GHOST_FIELD};
 
 use super::{coordset, field, topology};
@@ -18,12 +18,16 @@ struct Named<'call> {
     name: String,
     coordset: CString,
     topology: Topology<'call>,
+    /// The dimension of its cells, where there are others besides.
+    dimension: usize,
 }
 
-/// Reads a mesh; `None` for one that says nothing, as that of a rank without cells may.
+/// Reads a mesh; `None` for one that says nothing, as that of a rank without cells may. What is
+/// passed over is added to the notes.
 pub(super) fn read<'call>(
     node: &Node<'_, 'call>,
     with_fields: bool,
+    notes: &mut Vec<String>,
 ) -> Result<Option<Domain<'call>>, RunError> {
     if node.kind() == Kind::Empty || (node.kind() == Kind::Object && node.len() == 0) {
         return Ok(None);
@@ -41,14 +45,18 @@ pub(super) fn read<'call>(
         };
         let coordset = coordset::read(&coordset_node)?;
         let cells = topology::read(topology, &coordset)?;
-        named.push((
-            Named { name: topology.name().into_owned(), coordset: text, topology: cells },
-            coordset,
-        ));
+        let name = topology.name().into_owned();
+        let of_name = Named { name, coordset: text, topology: cells, dimension: 0 };
+        named.push((of_name, coordset));
         Ok(())
     })?;
+    if named.len() > 1 {
+        for (named, _) in &mut named {
+            named.dimension = named.topology.dimension()?;
+        }
+    }
     // The cells are those of the highest dimension.
-    let main = (0..named.len()).rev().max_by_key(|&index| named[index].0.topology.dimension());
+    let main = (0..named.len()).rev().max_by_key(|&index| named[index].0.dimension);
     let Some(main) = main else {
         return Err(topologies.wrong("at least one topology"));
     };
@@ -60,10 +68,10 @@ pub(super) fn read<'call>(
         fields: Vec::new(),
         faces: Vec::new(),
         roles: Roles::default(),
-        path: node.path(),
+        label: Label::Path(node.path()),
     };
     if with_fields {
-        read_fields(&mut domain, node, &main, &others)?;
+        read_fields(&mut domain, node, &main, &others, notes)?;
     }
     Ok(Some(domain))
 }
@@ -73,6 +81,7 @@ fn read_fields<'call>(
     node: &Node<'_, 'call>,
     main: &Named,
     others: &[Named<'call>],
+    notes: &mut Vec<String>,
 ) -> Result<(), RunError> {
     let Some(fields) = node.child(c"fields") else { return Ok(()) };
     if fields.kind() == Kind::Empty {
@@ -89,9 +98,8 @@ fn read_fields<'call>(
         if domain.faces.is_empty() {
             domain.faces.extend(faces(field_node, main, others)?);
         }
-        let Some(field) = field::read(field_node, &main.name, vertices, elements)? else {
-            return Ok(());
-        };
+        let read = field::read(field_node, &main.name, vertices, elements, notes)?;
+        let Some(field) = read else { return Ok(()) };
         let role = told.as_ref().and_then(|told| told.child(field_node.key()));
         let role = match role.as_ref().and_then(|role| role.child(c"attribute_type")) {
             Some(role) => role.text()?.into_owned(),
@@ -141,8 +149,8 @@ fn faces<'call>(
     let other = others.iter().find(|other| {
         other.name == of
             && other.coordset == main.coordset
-            && other.topology.dimension() == 2
-            && main.topology.dimension() == 3
+            && other.dimension == 2
+            && main.dimension == 3
     });
     let Some(other) = other else { return Ok(None) };
     let name = node.name();

@@ -29,12 +29,13 @@ pub(super) fn components<'call>(values: &Node<'_, 'call>) -> Result<Vec<Array<'c
 }
 
 /// Reads a field of this topology; `None` for one of another topology, or without values that could
-/// be shown.
+/// be shown, of which a note says so.
 pub(super) fn read<'call>(
     node: &Node<'_, 'call>,
     topology: &str,
     vertices: usize,
     elements: usize,
+    notes: &mut Vec<String>,
 ) -> Result<Option<Field<'call>>, RunError> {
     if let Some(of) = node.child(c"topology")
         && of.text()? != topology
@@ -58,6 +59,11 @@ pub(super) fn read<'call>(
             return Err(association_node.wrong_found(format!("'{other}'"), "'vertex' or 'element'"));
         }
     };
+    if node.child(c"values").is_none() && node.child(c"matset_values").is_some() {
+        let path = node.path();
+        notes.push(format!("'{path}' is passed over: it has values of materials alone"));
+        return Ok(None);
+    }
     let values = node.need(c"values", "an array, or an object of components")?;
     let components = components(&values)?;
     let found = components.first().map_or(0, Array::len);

@@ -1,7 +1,7 @@
 //! Rows of different lengths: what `connectivity`, `sizes` and `offsets` describe.
 
 use tombolo::foreign::RunError;
-use tombolo::foreign::mesh::Rows;
+use tombolo::foreign::mesh::{Label, Rows};
 
 use crate::node::Node;
 
@@ -23,5 +23,5 @@ pub(super) fn read<'call>(node: &Node<'_, 'call>) -> Result<Rows<'call>, RunErro
         }
         None => None,
     };
-    Ok(Rows::new(connectivity, sizes, offsets, node.path()))
+    Ok(Rows::new(connectivity, sizes, offsets, Label::Path(node.path())))
 }

@@ -2,7 +2,7 @@
 
 use tombolo::deform::mesh::CellType;
 use tombolo::foreign::RunError;
-use tombolo::foreign::mesh::{Coordset, Rows, Topology};
+use tombolo::foreign::mesh::{Coordset, Label, Rows, Topology};
 
 use super::coordset::counts;
 use super::rows;
@@ -95,7 +95,8 @@ fn unstructured<'call>(node: &Node<'_, 'call>) -> Result<Topology<'call>, RunErr
                 return Err(connectivity_node
                     .wrong(format!("a multiple of {size} values, for cells of shape '{name}'")));
             }
-            Ok(Topology::Uniform { cell_type, connectivity, path: connectivity_node.path() })
+            let label = Label::Path(connectivity_node.path());
+            Ok(Topology::Uniform { cell_type, connectivity, label })
         }
         None => Err(shape_node.wrong_found(format!("'{name}'"), KNOWN_SHAPES)),
     }
@@ -124,7 +125,11 @@ fn mixed<'call>(
     if shapes.len() != cells.count() {
         return Err(shapes_node.wrong(format!("{} values, as many as in 'sizes'", cells.count())));
     }
-    let has_polyhedra = map.iter().any(|(_, cell_type)| *cell_type == CellType::Polyhedron);
+    // The map may name polyhedra of which there are none, and whose faces are not there then.
+    let has_polyhedra = map.iter().any(|(_, cell_type)| *cell_type == CellType::Polyhedron)
+        && node.child(c"subelements").is_some();
     let faces = has_polyhedra.then(|| faces(node)).transpose()?;
-    Ok(Topology::Mixed { cells, shapes, map, faces, path: shapes_node.path() })
+    let label = Label::Path(shapes_node.path());
+    let expected = "one of the numbers in 'shape_map'";
+    Ok(Topology::Mixed { cells, shapes, map, faces, label, expected })
 }

@@ -1,6 +1,8 @@
 //! Cutting a whole mesh into parts.
 
-use crate::mesh::{Cells, FeatureSource, Mesh, MeshError, TaggedFaces, ghosts as bits};
+use crate::mesh::{
+    Cells, FeatureSource, Mesh, MeshError, TaggedFaces, TaggedVertices, ghosts as bits,
+};
 
 use super::Part;
 use crate::topology::{indices, marked, marks};
@@ -49,9 +51,10 @@ impl Part {
         let own = cells.subset(taken.iter().copied()).with_vertices(&numbers);
         let features = match mesh.features() {
             FeatureSource::SharpEdges => FeatureSource::SharpEdges,
-            FeatureSource::Vertices(tags) => FeatureSource::Vertices(
-                vertices.iter().map(|&vertex| tags[vertex as usize]).collect(),
-            ),
+            FeatureSource::Vertices(tagged) => FeatureSource::Vertices(TaggedVertices {
+                tags: vertices.iter().map(|&vertex| tagged.tags[vertex as usize]).collect(),
+                names: tagged.names.clone(),
+            }),
             FeatureSource::Faces(tagged) => {
                 let mut mine = TaggedFaces {
                     faces: Cells::new(),
@@ -110,8 +113,9 @@ impl Part {
                 let faces = tagged.faces.with_vertices(&new);
                 FeatureSource::Faces(TaggedFaces { faces, ..tagged.clone() })
             }
-            FeatureSource::Vertices(tags) => {
-                FeatureSource::Vertices(vertices.iter().map(|&old| tags[old]).collect())
+            FeatureSource::Vertices(tagged) => {
+                let tags = vertices.iter().map(|&old| tagged.tags[old]).collect();
+                FeatureSource::Vertices(TaggedVertices { tags, ..tagged.clone() })
             }
             FeatureSource::SharpEdges => FeatureSource::SharpEdges,
         };

@@ -56,10 +56,13 @@ fn meshes() -> Vec<Mesh> {
     let tets = box_of_tets([5, 4, 3], [0.0; 3], [2.0, 1.0, 1.0]);
     let sharp =
         Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::SharpEdges).unwrap();
-    let tags = tets.points().iter().map(|point| i64::from(point[0] > 1.0)).collect();
-    let by_vertex =
-        Mesh::new(tets.points().to_vec(), tets.cells().clone(), FeatureSource::Vertices(tags))
-            .unwrap();
+    let tags: Vec<i64> = tets.points().iter().map(|point| i64::from(point[0] > 1.0)).collect();
+    let by_vertex = Mesh::new(
+        tets.points().to_vec(),
+        tets.cells().clone(),
+        FeatureSource::Vertices(tags.into()),
+    )
+    .unwrap();
     let surface = Surface::extract(&tets, &FeatureSettings::default()).unwrap();
     let plane =
         Mesh::new(surface.points().to_vec(), surface.faces().clone(), FeatureSource::SharpEdges)

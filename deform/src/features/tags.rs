@@ -24,9 +24,10 @@ pub fn face_tags(source: &FeatureSource, faces: &Cells) -> Option<FaceTags> {
             let tags = faces.iter().map(|(_, vertices)| lookup.get(vertices)).collect();
             Some(FaceTags { tags, names: tagged.names.clone() })
         }
-        FeatureSource::Vertices(numbers) => {
+        FeatureSource::Vertices(tagged) => {
+            let numbers = &tagged.tags;
             let tags = faces.iter().map(|(_, vertices)| majority(numbers, vertices)).collect();
-            Some(FaceTags { tags, names: Vec::new() })
+            Some(FaceTags { tags, names: tagged.names.clone() })
         }
     }
 }
@@ -103,5 +104,20 @@ impl TagLookup {
         } else {
             self.large.get(&sorted(vertices)).copied()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{CellType, TaggedVertices};
+
+    #[test]
+    fn features_of_vertices_have_their_names() {
+        let names = vec![(7, "inlet".to_owned())];
+        let tagged = TaggedVertices { tags: vec![7, 7, 2, 2], names: names.clone() };
+        let faces = Cells::uniform(CellType::Triangle, vec![0, 1, 2, 1, 2, 3]).expect("two faces");
+        let tags = face_tags(&FeatureSource::Vertices(tagged), &faces).expect("tags");
+        assert_eq!((tags.tags, tags.names), (vec![Some(7), Some(2)], names));
     }
 }

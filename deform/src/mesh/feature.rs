@@ -13,7 +13,23 @@ pub enum FeatureSource {
     /// One feature number for each vertex, as a VTK point array named `features` gives them. A
     /// boundary face belongs to the feature that most of its vertices carry, the lowest number on a
     /// tie.
-    Vertices(Vec<i64>),
+    Vertices(TaggedVertices),
+}
+
+/// Vertices that carry a feature each.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct TaggedVertices {
+    /// The number of each vertex's feature.
+    pub tags: Vec<i64>,
+    /// The names of features, by their number, as those of [`TaggedFaces`].
+    pub names: Vec<(i64, String)>,
+}
+
+impl From<Vec<i64>> for TaggedVertices {
+    /// Numbers of features without names.
+    fn from(tags: Vec<i64>) -> Self {
+        Self { tags, names: Vec::new() }
+    }
 }
 
 /// Faces that carry a feature each. They need not be all of the boundary, and need not lie on it;
@@ -53,9 +69,9 @@ impl FeatureSource {
                 }
                 tagged.faces.validate(vertex_count)
             }
-            FeatureSource::Vertices(tags) if tags.len() != vertex_count => {
+            FeatureSource::Vertices(tagged) if tagged.tags.len() != vertex_count => {
                 Err(MeshError::FeatureCount {
-                    found: tags.len(),
+                    found: tagged.tags.len(),
                     expected: vertex_count,
                     what: "vertices",
                 })

@@ -29,7 +29,7 @@ pub use cell_faces::{FaceBuffer, lowest_four};
 pub use cell_type::CellType;
 pub use cells::Cells;
 pub use domain::Domain;
-pub use feature::{FeatureSource, TaggedFaces};
+pub use feature::{FeatureSource, TaggedFaces, TaggedVertices};
 pub(crate) use handedness::is_left_handed;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;

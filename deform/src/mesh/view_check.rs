@@ -203,7 +203,7 @@ impl MeshView<'_> {
         match self.features {
             FeatureSource::SharpEdges => Ok(()),
             FeatureSource::Faces(tagged) => count(tagged.tags.len(), tagged.faces.len(), "faces"),
-            FeatureSource::Vertices(tags) => count(tags.len(), vertices, "vertices"),
+            FeatureSource::Vertices(tagged) => count(tagged.tags.len(), vertices, "vertices"),
         }
     }
 

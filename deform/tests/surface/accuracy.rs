@@ -105,9 +105,9 @@ fn without_a_fixed_feature_the_component_goes_with_its_handle() {
 }
 
 fn triangles(points: &[Vector], corners: &[u32]) -> Mesh {
-    let tags = points.iter().map(|point| i64::from(point[0] > 0.5)).collect();
+    let tags: Vec<i64> = points.iter().map(|point| i64::from(point[0] > 0.5)).collect();
     let cells = Cells::uniform(CellType::Triangle, corners.to_vec()).unwrap();
-    Mesh::new(points.to_vec(), cells, FeatureSource::Vertices(tags)).unwrap()
+    Mesh::new(points.to_vec(), cells, FeatureSource::Vertices(tags.into())).unwrap()
 }
 
 #[test]
@@ -146,9 +146,12 @@ fn a_seam_that_an_edit_would_open_is_named() {
     ];
     let mesh = triangles(&points, &[0, 1, 2, 0, 2, 3, 4, 6, 7, 4, 7, 5]);
     let tags = vec![0, 0, 0, 0, 1, 1, 1, 1];
-    let mesh =
-        Mesh::new(mesh.points().to_vec(), mesh.cells().clone(), FeatureSource::Vertices(tags))
-            .unwrap();
+    let mesh = Mesh::new(
+        mesh.points().to_vec(),
+        mesh.cells().clone(),
+        FeatureSource::Vertices(tags.into()),
+    )
+    .unwrap();
     let mut editor = editor(&mesh);
     let order = HarmonicOrder::Harmonic;
     let open = translate(&["feature-1"], &["feature-0"], [0.0, 0.0, 1.0], order);

@@ -251,7 +251,7 @@ fn assert_independent_of_numbers(counts: [usize; 2], roughness: f64) {
     for (new, &old) in order.iter().enumerate() {
         new_number[old] = new as u32;
     }
-    let FeatureSource::Vertices(tags) = mesh.features() else { unreachable!() };
+    let FeatureSource::Vertices(tagged) = mesh.features() else { unreachable!() };
     let mut triangles: Vec<Vec<u32>> = mesh
         .cells()
         .iter()
@@ -263,7 +263,9 @@ fn assert_independent_of_numbers(counts: [usize; 2], roughness: f64) {
     let shuffled = Mesh::new(
         order.iter().map(|&old| mesh.points()[old]).collect(),
         Cells::uniform(CellType::Triangle, triangles.concat()).unwrap(),
-        FeatureSource::Vertices(order.iter().map(|&old| tags[old]).collect()),
+        FeatureSource::Vertices(
+            order.iter().map(|&old| tagged.tags[old]).collect::<Vec<i64>>().into(),
+        ),
     )
     .unwrap();
     let (mut first, mut second) = (editor(&mesh), editor(&shuffled));
@@ -433,11 +435,11 @@ pub fn moebius_strip() -> Mesh {
                 .unwrap();
         }
     }
-    let tags = points
+    let tags: Vec<i64> = points
         .iter()
         .map(|point| if point[0] > 1.0 { 0 } else { 1 + i64::from(point[0] < -1.0) })
         .collect();
-    Mesh::new(points, cells, FeatureSource::Vertices(tags)).unwrap()
+    Mesh::new(points, cells, FeatureSource::Vertices(tags.into())).unwrap()
 }
 
 #[test]

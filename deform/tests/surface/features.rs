@@ -79,8 +79,10 @@ fn quadrilaterals_may_be_tagged_as_two_triangles() {
 #[test]
 fn vertices_vote_for_the_feature_of_their_face() {
     let cube = shapes::single_cell(CellType::Hexahedron);
-    let surface =
-        extract(&with_features(&cube, FeatureSource::Vertices(vec![7, 7, 7, 7, 2, 2, 2, 2])));
+    let surface = extract(&with_features(
+        &cube,
+        FeatureSource::Vertices(vec![7, 7, 7, 7, 2, 2, 2, 2].into()),
+    ));
     assert_eq!(surface.features().names(), ["feature-2", "feature-7"]);
     // Bottom by majority; the four sides by the lowest number on a tie.
     let bottom = surface.features().face_features().iter().filter(|&&feature| feature == 1).count();

@@ -1,8 +1,8 @@
 //! From the cells of a file, of all dimensions mixed, to a mesh, its features and its fields.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
-use tombolo_deform::mesh::{Cells, FeatureSource, Mesh, TaggedFaces, Vector};
+use tombolo_deform::mesh::{Cells, FeatureSource, Mesh, TaggedFaces, TaggedVertices, Vector};
 
 use super::MeshFile;
 use super::error::Flaw;
@@ -106,12 +106,13 @@ impl FileContents {
             );
             let (numbers, tags): (Vec<usize>, Vec<i64>) = tagged.into_iter().unzip();
             let faces = cells.subset(numbers).with_vertices(&new_numbers);
-            let names = names.into_iter().filter(|(number, _)| tags.contains(number)).collect();
+            let names = names_of(names, &tags);
             FeatureSource::Faces(TaggedFaces { faces, tags, names })
         } else if let Some(tags) = point_tags {
-            FeatureSource::Vertices(
-                vertices.iter().filter_map(|&vertex| tags.get(vertex).copied()).collect(),
-            )
+            let tags: Vec<i64> =
+                vertices.iter().filter_map(|&vertex| tags.get(vertex).copied()).collect();
+            let names = names_of(names, &tags);
+            FeatureSource::Vertices(TaggedVertices { tags, names })
         } else {
             FeatureSource::SharpEdges
         };
@@ -126,6 +127,12 @@ impl FileContents {
         notes.extend(mesh.cells().handedness_note());
         Ok(MeshFile { mesh, fields, notes })
     }
+}
+
+/// The names of the features that there are.
+fn names_of(names: BTreeMap<i64, String>, tags: &[i64]) -> Vec<(i64, String)> {
+    let there: HashSet<i64> = tags.iter().copied().collect();
+    names.into_iter().filter(|(number, _)| there.contains(number)).collect()
 }
 
 fn select(field: &mut Field, kept: &[usize]) {

@@ -4,6 +4,7 @@ use tombolo_deform::bounds::Bounds;
 
 use super::domain::Domain;
 use super::field::Field;
+use super::label::Label;
 use super::levels::{Grid, Mask};
 use crate::foreign::array::Fingerprint;
 use crate::foreign::error::RunError;
@@ -33,8 +34,8 @@ impl Block<'_> {
 pub struct Channel<'call> {
     /// Its name.
     pub name: String,
-    /// Its name in errors.
-    pub path: String,
+    /// What errors call it.
+    pub label: Label,
     /// Its meshes; none on a rank without data.
     pub blocks: Vec<Block<'call>>,
     /// Names of features by their numbers.
@@ -87,6 +88,42 @@ impl<'call> Channel<'call> {
         }
     }
 
+    /// Whether the numbers at its vertices say which feature they belong to: where all blocks have
+    /// them, and none has faces with features.
+    pub(super) fn has_vertex_features(&self) -> bool {
+        !self.blocks.is_empty()
+            && self.blocks.iter().all(|Block { domain, .. }| {
+                domain.faces.is_empty() && domain.roles.vertex_features.is_some()
+            })
+    }
+
+    /// What is said of the mesh itself and passed over, for the log.
+    pub(in crate::foreign) fn passed_over(&self) -> Vec<String> {
+        let any =
+            |is_so: fn(&Domain<'_>) -> bool| self.blocks.iter().any(|block| is_so(&block.domain));
+        let mut notes = Vec::new();
+        if any(|domain| domain.roles.vertex_features.is_some())
+            && !any(|domain| !domain.faces.is_empty())
+            && !self.has_vertex_features()
+        {
+            notes.push(format!(
+                "{}: the features of vertices are passed over, as not every block has them",
+                self.label
+            ));
+        }
+        let has_numbers = |domain: &Domain<'_>| {
+            domain.roles.global_vertices.is_some() || domain.roles.global_cells.is_some()
+        };
+        if self.single().is_none() && any(has_numbers) {
+            // Where two blocks touch, one number stands for two vertices.
+            notes.push(format!(
+                "{}: the global numbers of several blocks are passed over: the vertices that ranks share are found by their places",
+                self.label
+            ));
+        }
+        notes
+    }
+
     /// A fingerprint by which these cells are told from others.
     pub(super) fn fingerprint(&self) -> Fingerprint {
         let mut fingerprint = Fingerprint::default();
@@ -104,7 +141,8 @@ impl<'call> Channel<'call> {
         self.blocks.iter().try_for_each(|block| block.domain.check_memory())?;
         for field in &self.of_mesh {
             for array in &field.components {
-                memory::check(array, format_args!("{}/state/fields/{}", self.path, field.name))?;
+                let below = || format!("state/fields/{}", field.name);
+                memory::check(array, || self.label.field(&below(), &field.name))?;
             }
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 use super::coordset::Coordset;
 use super::field::{self, Field};
+use super::label::Label;
 use super::topology::Topology;
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
@@ -55,8 +56,8 @@ pub struct Domain<'call> {
     pub faces: Vec<Faces<'call>>,
     /// Fields that say something of the mesh itself.
     pub roles: Roles<'call>,
-    /// Its name in errors.
-    pub path: String,
+    /// What errors call it.
+    pub label: Label,
 }
 
 impl<'call> Domain<'call> {
@@ -97,20 +98,35 @@ impl<'call> Domain<'call> {
 
     /// Refuses arrays whose memory cannot be read.
     pub(super) fn check_memory(&self) -> Result<(), RunError> {
+        let label = &self.label;
         for array in self.coordset.arrays() {
-            memory::check(array, format_args!("{}/coordsets", self.path))?;
+            memory::check(array, || label.part("coordsets", "points"))?;
         }
-        let of_faces = self
-            .faces
-            .iter()
-            .flat_map(|faces| faces.topology.arrays().into_iter().chain([&faces.tags]));
-        for array in self.topology.arrays().into_iter().chain(of_faces) {
-            memory::check(array, format_args!("{}/topologies", self.path))?;
+        for array in self.topology.arrays() {
+            memory::check(array, || label.part("topologies", "cells"))?;
+        }
+        for faces in &self.faces {
+            for array in faces.topology.arrays() {
+                memory::check(array, || label.part("topologies", "faces"))?;
+            }
+            memory::check(&faces.tags, || label.part("fields", "faces, features"))?;
         }
         for field in &self.fields {
             for array in &field.components {
-                memory::check(array, format_args!("{}/fields/{}/values", self.path, field.name))?;
+                let below = || format!("fields/{}/values", field.name);
+                memory::check(array, || label.field(&below(), &field.name))?;
             }
+        }
+        let Roles { ghosts, global_vertices, global_cells, vertex_features } = &self.roles;
+        for (array, name) in [
+            (ghosts, "ghost cells"),
+            (global_vertices, "global vertices"),
+            (global_cells, "global cells"),
+            (vertex_features, "vertex features"),
+        ] {
+            array
+                .iter()
+                .try_for_each(|array| memory::check(array, || label.part("fields", name)))?;
         }
         Ok(())
     }

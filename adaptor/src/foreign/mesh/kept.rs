@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use tombolo_deform::bounds::Bounds;
 use tombolo_deform::mesh::{
-    ArrayView, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, TaggedFaces, Values,
-    Vector, ghosts,
+    ArrayView, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, TaggedFaces,
+    TaggedVertices, Values, Vector, ghosts,
 };
 use tombolo_pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
 
@@ -59,10 +59,14 @@ struct Marks {
 /// The copies and marks that are kept of one channel.
 #[derive(Debug, Default)]
 pub(crate) struct Kept {
+    /// That of the cells that are kept; `None` where they could not be read to their end.
     fingerprint: Option<Fingerprint>,
+    /// That of the cells which passed last, and their generation: others are told from these.
+    passed: Option<(Fingerprint, u64)>,
     counts: (usize, usize),
     address: usize,
     generation: u64,
+    newest_generation: u64,
     cells: Option<Cells>,
     points: Vec<Vector>,
     marks: Marks,
@@ -73,7 +77,7 @@ pub(crate) struct Kept {
 impl Kept {
     /// Brings what is kept up to date with what the solver shows. Where nobody will look at the
     /// values of this step (`looked_at`), nothing is copied or compared unless the mesh has another
-    /// size. Says whether the cells are others than before.
+    /// size. Says whether the cells are others than those that passed last.
     pub(crate) fn update(
         &mut self,
         channel: &Channel<'_>,
@@ -91,15 +95,15 @@ impl Kept {
         let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
         let fingerprint = channel.fingerprint();
         let is_same = self.fingerprint == Some(fingerprint);
-        let is_other = self.fingerprint.is_some() && !is_same;
+        let is_other = self.passed.is_some_and(|(passed, _)| passed != fingerprint);
         self.counts = counts;
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         if !lent_points || (!is_same && lent_cells.is_none()) {
             self.points.clear();
             if self.points.try_reserve(counts.0).is_err() {
-                let path = format_args!("{}/data", channel.path);
                 let found = format!("{} vertices", counts.0);
-                return Err(RunError::wrong(path, found, "as many as there is memory for"));
+                let points = channel.label.part("data", "points");
+                return Err(points.wrong(found, "as many as there is memory for"));
             }
             for block in &channel.blocks {
                 block.domain.coordset.append(&mut self.points);
@@ -107,7 +111,14 @@ impl Kept {
         }
         if !is_same {
             self.fingerprint = None;
-            self.generation += 1;
+            // The cells that are back after others were refused are those that they were.
+            self.generation = match self.passed {
+                Some((passed, generation)) if passed == fingerprint => generation,
+                _ => {
+                    self.newest_generation += 1;
+                    self.newest_generation
+                }
+            };
             self.cells = None;
             self.address = lent_cells.unwrap_or(0);
             // Those that are lent are checked by the adaptor.
@@ -130,6 +141,11 @@ impl Kept {
         }
         self.copy_fields(channel);
         Ok(is_other)
+    }
+
+    /// Takes what is kept for what passed: the adaptor has refused none of it.
+    pub(crate) fn pass(&mut self) {
+        self.passed = self.fingerprint.map(|fingerprint| (fingerprint, self.generation));
     }
 
     fn points_of(&self, channel: &Channel<'_>) -> Vec<Vector> {
@@ -250,7 +266,7 @@ impl Channel<'_> {
         let mut kept = Kept::default();
         kept.update(self, true)?;
         let mesh = kept.views(self, &mut Vec::new()).to_mesh();
-        mesh.map_err(|source| RunError::Cells { path: self.path.clone(), source })
+        mesh.map_err(|source| RunError::Cells { path: self.label.to_string(), source })
     }
 }
 
@@ -296,11 +312,7 @@ fn joined(cells: &Cells, points: &[Vector], channel: &Channel<'_>) -> Result<Cel
         let vertices: Vec<u32> =
             vertices.iter().filter_map(|&vertex| numbers.get(vertex as usize).copied()).collect();
         joined.push(cell_type, &vertices).map_err(|error| {
-            RunError::wrong(
-                format_args!("{}/data", channel.path),
-                error,
-                "grids whose points lie apart",
-            )
+            channel.label.part("data", "cells").wrong(error, "grids whose points lie apart")
         })?;
     }
     Ok(joined)
@@ -311,22 +323,20 @@ fn marks(channel: &Channel<'_>) -> Result<Marks, RunError> {
         Marks { features: features(channel)?, ghosts: ghost_bits(channel), ..Marks::default() };
     let Some(domain) = channel.single() else { return Ok(marks) };
     let roles = &domain.roles;
-    let numbers = |array: &Array<'_>| -> Result<Vec<u64>, RunError> {
-        (0..array.len())
-            .map(|index| {
-                array.whole(index).ok_or_else(|| {
-                    let found = format!("the global number {}", array.get(index));
-                    RunError::wrong(
-                        format_args!("{}/data/fields", channel.path),
-                        found,
-                        "whole numbers from 0 on",
-                    )
-                })
+    let numbers = |array: &Array<'_>, name: &str| -> Result<Vec<u64>, RunError> {
+        let number = |index: usize| {
+            array.whole(index).ok_or_else(|| {
+                let found = format!("the number {} at entry {index}", array.get(index));
+                domain.label.part("fields", name).wrong(found, "whole numbers from 0 on")
             })
-            .collect()
+        };
+        (0..array.len()).map(number).collect()
     };
-    marks.global_vertices = roles.global_vertices.as_ref().map(numbers).transpose()?;
-    marks.global_cells = roles.global_cells.as_ref().map(numbers).transpose()?;
+    let of = |array: &Option<Array<'_>>, name: &str| {
+        array.as_ref().map(|array| numbers(array, name)).transpose()
+    };
+    marks.global_vertices = of(&roles.global_vertices, "global vertices")?;
+    marks.global_cells = of(&roles.global_cells, "global cells")?;
     Ok(marks)
 }
 
@@ -352,15 +362,15 @@ fn ghost_bits(channel: &Channel<'_>) -> Option<Vec<u8>> {
 
 /// Where the features come from: tagged faces, numbers at vertices, else sharp edges.
 fn features(channel: &Channel<'_>) -> Result<FeatureSource, RunError> {
-    if let Some(domain) = channel.single()
-        && let Some(numbers) = &domain.roles.vertex_features
-        && channel.blocks.iter().all(|block| block.domain.faces.is_empty())
-    {
-        return Ok(FeatureSource::Vertices(
-            (0..numbers.len()).map(|at| numbers.integer(at).unwrap_or(0)).collect(),
-        ));
+    let names = channel.feature_names.clone();
+    if channel.has_vertex_features() {
+        let arrays = channel.blocks.iter().filter_map(|block| block.domain.roles.vertex_features);
+        let number = |array: &Array<'_>, at: usize| array.integer(at).unwrap_or(0);
+        let tags =
+            arrays.flat_map(|array| (0..array.len()).map(move |at| number(&array, at))).collect();
+        return Ok(FeatureSource::Vertices(TaggedVertices { tags, names }));
     }
-    let mut tagged = TaggedFaces { names: channel.feature_names.clone(), ..TaggedFaces::default() };
+    let mut tagged = TaggedFaces { names, ..TaggedFaces::default() };
     let mut base = 0;
     let mut points = Vec::new();
     for block in &channel.blocks {

@@ -1,9 +1,8 @@
 //! Rows of different lengths: what `connectivity`, `sizes` and `offsets` describe.
 
-use std::fmt::Arguments;
-
 use tombolo_deform::mesh::MeshError;
 
+use super::label::Label;
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
 
@@ -12,7 +11,7 @@ use crate::foreign::error::RunError;
 pub struct Rows<'call> {
     connectivity: Array<'call>,
     extents: Extents<'call>,
-    path: String,
+    label: Label,
 }
 
 /// Where rows begin and end.
@@ -25,23 +24,23 @@ enum Extents<'call> {
 }
 
 impl<'call> Rows<'call> {
-    /// Rows of these sizes, which begin at the `offsets`, or else one behind the other; `path` is
-    /// what errors call them.
+    /// Rows of these sizes, which begin at the `offsets`, or else one behind the other, up to the
+    /// end of the connectivity; `label` is what errors call them.
     #[must_use]
     pub fn new(
         connectivity: Array<'call>,
         sizes: Array<'call>,
         offsets: Option<Array<'call>>,
-        path: String,
+        label: Label,
     ) -> Self {
-        Self { connectivity, extents: Extents::Sizes(sizes, offsets), path }
+        Self { connectivity, extents: Extents::Sizes(sizes, offsets), label }
     }
 
     /// Rows each of which ends where the next begins, by offsets of which there is one more than
-    /// there are rows; `path` is what errors call them.
+    /// there are rows; `label` is what errors call them.
     #[must_use]
-    pub fn between(connectivity: Array<'call>, offsets: Array<'call>, path: String) -> Self {
-        Self { connectivity, extents: Extents::Offsets(offsets), path }
+    pub fn between(connectivity: Array<'call>, offsets: Array<'call>, label: Label) -> Self {
+        Self { connectivity, extents: Extents::Offsets(offsets), label }
     }
 
     /// How many rows there are.
@@ -59,9 +58,9 @@ impl<'call> Rows<'call> {
         vertices: usize,
         visit: impl FnMut(usize, &[u32]) -> Result<(), RunError>,
     ) -> Result<(), RunError> {
-        let path = format_args!("{}/connectivity", self.path);
+        let label = || self.part("connectivity");
         self.for_each_of(
-            |entry, cell| vertex(&self.connectivity, path, entry, cell, vertices),
+            |entry, cell| vertex(&self.connectivity, &label, entry, cell, vertices),
             visit,
         )
     }
@@ -90,8 +89,7 @@ impl<'call> Rows<'call> {
             let end = start.checked_add(size).filter(|end| *end <= self.connectivity.len());
             let Some(end) = end else {
                 let entries = self.connectivity.len();
-                return Err(RunError::wrong(
-                    format_args!("{}/connectivity", self.path),
+                return Err(self.part("connectivity").wrong(
                     format_args!(
                         "{entries} entries, but row {index} begins at {start} and has {size}"
                     ),
@@ -105,7 +103,17 @@ impl<'call> Rows<'call> {
             }
             visit(index, &row)?;
         }
+        let entries = self.connectivity.len();
+        if next < entries && matches!(self.extents, Extents::Sizes(_, None)) {
+            let found = format_args!("{entries} entries, of which the rows have {next}");
+            return Err(self.part("connectivity").wrong(found, "as many as the sizes add up to"));
+        }
         Ok(())
+    }
+
+    /// What errors call one of the arrays.
+    fn part(&self, name: &str) -> Label {
+        self.label.part(name, name)
     }
 
     /// Where a row begins, and its size; it begins at `next` where nothing else is said.
@@ -126,11 +134,8 @@ impl<'call> Rows<'call> {
                     self.at(offsets, "offsets", index + 1, limit)?,
                 ];
                 let size = end.checked_sub(start).ok_or_else(|| {
-                    RunError::wrong(
-                        format_args!("{}/offsets", self.path),
-                        format_args!("{end} behind {start} at entry {}", index + 1),
-                        "offsets that do not fall",
-                    )
+                    let found = format_args!("{end} behind {start} at entry {}", index + 1);
+                    self.part("offsets").wrong(found, "offsets that do not fall")
                 })?;
                 Ok((start, size))
             }
@@ -144,16 +149,16 @@ impl<'call> Rows<'call> {
         index: usize,
         limit: u64,
     ) -> Result<T, RunError> {
-        entry(array, format_args!("{}/{name}", self.path), index, limit)
+        entry(array, &|| self.part(name), index, limit)
     }
 
     /// The error of a cell that names a vertex which does not exist.
     pub(super) fn no_such_vertex(&self, cell: usize, vertex: u32, vertices: usize) -> RunError {
-        no_such_vertex(format_args!("{}/connectivity", self.path), cell, vertex.into(), vertices)
+        no_such_vertex(&self.part("connectivity"), cell, vertex.into(), vertices)
     }
 
     pub(super) fn error(&self, index: usize, found: String, expected: &str) -> RunError {
-        RunError::wrong(&self.path, format_args!("{found} in row {index}"), expected)
+        self.label.wrong(format_args!("{found} in row {index}"), expected)
     }
 
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
@@ -172,7 +177,7 @@ impl<'call> Rows<'call> {
 /// One whole number of an array that is below `limit`.
 fn entry<T: TryFrom<u64>>(
     array: &Array,
-    path: Arguments<'_>,
+    label: &dyn Fn() -> Label,
     index: usize,
     limit: u64,
 ) -> Result<T, RunError> {
@@ -183,27 +188,27 @@ fn entry<T: TryFrom<u64>>(
             0 => "no entry, as there is nothing to name".to_owned(),
             _ => format!("whole numbers from 0 to {}", limit - 1),
         };
-        RunError::wrong(path, format_args!("{} at entry {index}", array.get(index)), expected)
+        label().wrong(format_args!("{} at entry {index}", array.get(index)), expected)
     })
 }
 
 /// The vertex of a cell, of which there are `vertices`.
 pub(super) fn vertex(
     array: &Array,
-    path: Arguments<'_>,
+    label: &dyn Fn() -> Label,
     index: usize,
     cell: usize,
     vertices: usize,
 ) -> Result<u32, RunError> {
     match array.integer(index).map(i64::cast_unsigned) {
         Some(vertex) if vertex >= vertices as u64 => {
-            Err(no_such_vertex(path, cell, vertex, vertices))
+            Err(no_such_vertex(&label(), cell, vertex, vertices))
         }
-        _ => entry(array, path, index, vertices as u64),
+        _ => entry(array, label, index, vertices as u64),
     }
 }
 
-fn no_such_vertex(path: Arguments<'_>, cell: usize, vertex: u64, vertices: usize) -> RunError {
+fn no_such_vertex(label: &Label, cell: usize, vertex: u64, vertices: usize) -> RunError {
     let source = MeshError::VertexNumber { cell, vertex, vertex_count: vertices };
-    RunError::Cells { path: path.to_string(), source }
+    RunError::Cells { path: label.to_string(), source }
 }

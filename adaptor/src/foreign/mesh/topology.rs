@@ -2,10 +2,12 @@
 
 use tombolo_deform::mesh::{CellType, Cells, CellsView, Vector};
 
+use super::label::Label;
 use super::polyhedron::turn_outward;
 use super::rows::{Rows, vertex};
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
+use crate::foreign::memory;
 
 /// Which cells a mesh has.
 #[derive(Debug, Clone)]
@@ -23,8 +25,8 @@ pub enum Topology<'call> {
         cell_type: CellType,
         /// The vertices, cell after cell.
         connectivity: Array<'call>,
-        /// The name of the connectivity in errors.
-        path: String,
+        /// What errors call the connectivity.
+        label: Label,
     },
     /// Those of one type after those of another: topologies of uniform cells.
     Types(Vec<Topology<'call>>),
@@ -47,8 +49,10 @@ pub enum Topology<'call> {
         map: Vec<(i64, CellType)>,
         /// The vertices of each face of polyhedra.
         faces: Option<Rows<'call>>,
-        /// The name of the types' numbers in errors.
-        path: String,
+        /// What errors call the types' numbers.
+        label: Label,
+        /// The numbers that are expected, in the solver's terms.
+        expected: &'static str,
     },
 }
 
@@ -69,20 +73,37 @@ impl<'call> Topology<'call> {
         }
     }
 
-    /// The highest dimension that its cells can have.
-    #[must_use]
-    pub fn dimension(&self) -> usize {
-        match self {
+    /// The highest dimension of its cells; of mixed ones the types that occur are looked at.
+    ///
+    /// # Errors
+    /// [`RunError`] where the memory that holds the types cannot be read.
+    pub fn dimension(&self) -> Result<usize, RunError> {
+        Ok(match self {
             Topology::Points(_) => 0,
             Topology::Grid { cells } => cells.iter().filter(|count| **count > 0).count(),
             Topology::Uniform { cell_type, .. } => cell_type.dimension(),
-            Topology::Types(types) => types.iter().map(Topology::dimension).max().unwrap_or(0),
+            Topology::Types(types) => {
+                let dimensions = types.iter().map(Topology::dimension);
+                dimensions.collect::<Result<Vec<_>, _>>()?.into_iter().max().unwrap_or(0)
+            }
             Topology::Polygonal(_) => 2,
             Topology::Polyhedral { .. } => 3,
-            Topology::Mixed { map, .. } => {
-                map.iter().map(|(_, cell_type)| cell_type.dimension()).max().unwrap_or(0)
+            Topology::Mixed { shapes, map, label, .. } => {
+                memory::check(shapes, || label.clone())?;
+                let dimensions = map.iter().map(|(_, cell_type)| cell_type.dimension());
+                let most = dimensions.max().unwrap_or(0);
+                let mut highest = 0;
+                for cell in 0..shapes.len() {
+                    let number = shapes.integer(cell);
+                    let known = map.iter().find(|(known, _)| Some(*known) == number);
+                    highest = known.map_or(highest, |(_, of)| of.dimension().max(highest));
+                    if highest == most {
+                        break;
+                    }
+                }
+                highest
             }
-        }
+        })
     }
 
     /// The cells as they lie in the solver's memory, where they can be lent.
@@ -103,45 +124,36 @@ impl<'call> Topology<'call> {
         let shift = number(base);
         let shifted =
             |row: &[u32]| -> Vec<u32> { row.iter().map(|vertex| vertex + shift).collect() };
-        let mut push = |path: &str, cell: usize, cell_type: CellType, row: &[u32]| {
+        let mut push = |label: &Label, cell: usize, cell_type: CellType, row: &[u32]| {
             cells.push(cell_type, row).map_err(|error| {
-                RunError::wrong(
-                    path,
-                    format_args!("cell {cell}: {error}"),
-                    "as many vertices as the shape has",
-                )
+                let found = format_args!("cell {cell}: {error}");
+                label.wrong(found, "as many vertices as the shape has")
             })
         };
         match self {
             Topology::Points(count) => {
+                let unnamed = Label::Words("points".into());
                 for cell in (0..*count).filter(|cell| keep(*cell)) {
-                    push("points", cell, CellType::Vertex, &[shift + number(cell)])?;
+                    push(&unnamed, cell, CellType::Vertex, &[shift + number(cell)])?;
                 }
             }
             Topology::Grid { cells: counts } => {
+                let unnamed = Label::Words("grid".into());
                 for cell in (0..self.cell_count()).filter(|cell| keep(*cell)) {
                     let (cell_type, row) = grid_cell(*counts, cell);
-                    push("grid", cell, cell_type, &shifted(&row))?;
+                    push(&unnamed, cell, cell_type, &shifted(&row))?;
                 }
             }
-            Topology::Uniform { cell_type, connectivity, path } => {
+            Topology::Uniform { cell_type, connectivity, label } => {
                 let size = cell_type.vertex_count().unwrap_or(1);
                 let mut row = Vec::with_capacity(size);
                 for cell in (0..self.cell_count()).filter(|cell| keep(*cell)) {
                     row.clear();
                     for index in cell * size..(cell + 1) * size {
-                        row.push(
-                            shift
-                                + vertex(
-                                    connectivity,
-                                    format_args!("{path}"),
-                                    index,
-                                    cell,
-                                    vertices,
-                                )?,
-                        );
+                        let label = || label.clone();
+                        row.push(shift + vertex(connectivity, &label, index, cell, vertices)?);
                     }
-                    push(path, cell, *cell_type, &row)?;
+                    push(label, cell, *cell_type, &row)?;
                 }
             }
             Topology::Types(types) => {
@@ -166,7 +178,7 @@ impl<'call> Topology<'call> {
                     pushed.map_err(|found| rows.error(cell, found, "four faces or more"))
                 })?;
             }
-            Topology::Mixed { cells: rows, shapes, map, faces, path } => {
+            Topology::Mixed { cells: rows, shapes, map, faces, label, expected } => {
                 let faces =
                     faces.as_ref().map_or(Ok(Vec::new()), |faces| all_faces(faces, vertices))?;
                 rows.for_each(u32::MAX as usize, |cell, row| {
@@ -177,11 +189,7 @@ impl<'call> Topology<'call> {
                     let found = map.iter().find(|(known, _)| Some(*known) == number);
                     let Some((_, cell_type)) = found else {
                         let found = format!("{} at entry {cell}", shapes.get(cell));
-                        return Err(RunError::wrong(
-                            path,
-                            found,
-                            "one of the numbers in 'shape_map'",
-                        ));
+                        return Err(label.wrong(found, expected));
                     };
                     let beyond = row.iter().find(|vertex| **vertex as usize >= vertices);
                     if let Some(&vertex) = beyond.filter(|_| *cell_type != CellType::Polyhedron) {

@@ -8,7 +8,9 @@ mod vtk_files;
 
 use std::sync::Arc;
 
-use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, Vector};
+use tombolo_deform::mesh::{
+    CellType, Cells, FeatureSource, Mesh, NumberType, TaggedFaces, TaggedVertices, Vector,
+};
 
 use super::{Compression, MeshFile, parse_mesh, read_mesh, write_mesh};
 use crate::extract::{Association, Extract, ExtractFeatures, Field};
@@ -75,7 +77,8 @@ fn one_of_some(dimension: usize, is_chosen: impl Fn(CellType) -> bool) -> Mesh {
             faces: cells.clone(),
         }),
         _ => {
-            FeatureSource::Vertices((0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect())
+            let tags: Vec<i64> = (0..points.len() as i64).map(|vertex| vertex % 3 - 1).collect();
+            FeatureSource::Vertices(tags.into())
         }
     };
     Mesh::new(points, cells, features).unwrap()

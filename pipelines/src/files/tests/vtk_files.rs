@@ -96,6 +96,21 @@ fn negative_tags_keep_their_names() {
 /// Names that stand in an array of text, as they were written up to now and as other programs may
 /// write them.
 #[test]
+fn features_of_vertices_keep_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = one_of_each_for("mesh.vtk", 3);
+    let tags: Vec<i64> = (0..plain.points().len() as i64).map(|vertex| vertex % 2).collect();
+    let names = vec![(0, "inlet".to_owned()), (1, "outlet".to_owned())];
+    let features = FeatureSource::Vertices(TaggedVertices { tags, names });
+    let mesh = Mesh::new(plain.points().to_vec(), plain.cells().clone(), features).unwrap();
+    for (name, compression) in WHOLE_MESHES {
+        let path = folder.path().join(name);
+        write_mesh(&path, &mesh, &[], compression).unwrap();
+        assert_eq!(read_mesh(&path).unwrap().mesh.features(), mesh.features(), "{name}");
+    }
+}
+
+#[test]
 fn names_as_text_are_read() {
     let text = |field_data: &str| {
         format!(

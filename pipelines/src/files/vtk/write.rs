@@ -92,11 +92,12 @@ fn grid_of_mesh<'a>(
     let mut owners = Vec::new();
     match mesh.features() {
         FeatureSource::SharpEdges => {}
-        FeatureSource::Vertices(tags) => {
+        FeatureSource::Vertices(tagged) => {
+            grid.names.clone_from(&tagged.names);
             grid.point_arrays.push(Array {
                 name: FEATURES,
                 components: 1,
-                values: Values::Integers(tags.clone()),
+                values: Values::Integers(tagged.tags.clone()),
             });
         }
         FeatureSource::Faces(tagged) => {
