@@ -266,9 +266,8 @@ impl Killed {
         let end = journal.floor_char_boundary(end);
         std::fs::write(self.file(), &journal[..end]).unwrap();
         let whole = journal[..end].rsplit_once('\n').map_or("", |(whole, _)| whole);
-        let has = |id: &String| {
-            whole.contains(&format!("{{\"id\":\"{id}\",\"status\":\"accepted\""))
-        };
+        let has =
+            |id: &String| whole.contains(&format!("{{\"id\":\"{id}\",\"status\":\"accepted\""));
         self.acknowledged.retain(has);
     }
 

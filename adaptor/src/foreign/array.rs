@@ -264,15 +264,23 @@ impl<'call> Array<'call> {
         !self.number.is_real()
     }
 
-    /// Takes the values into a fingerprint.
+    /// Takes the values into a fingerprint, whatever their type and wherever each lies.
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
         into.add(self.count as u64);
-        if self.is_compact() && self.count > 0 {
-            let bytes = self.count * self.number.bytes();
-            // SAFETY: the values lie one beside the other (`new`), and any bytes are bytes.
-            into.bytes(unsafe { std::slice::from_raw_parts(self.first, bytes) });
-        } else {
-            (0..self.count).for_each(|index| into.add(self.get(index).to_bits()));
+        let is_beside = self.is_compact() && !self.swapped;
+        match self.number {
+            NumberType::U32 if is_beside && let Some((values, _)) = self.slice::<u32>() => {
+                into.integers(values.len(), |index| i64::from(values[index]));
+            }
+            NumberType::I32 if is_beside && let Some((values, _)) = self.slice::<i32>() => {
+                into.integers(values.len(), |index| i64::from(values[index]));
+            }
+            NumberType::I64 if is_beside && let Some((values, _)) = self.slice::<i64>() => {
+                into.integers(values.len(), |index| values[index]);
+            }
+            _ => into.integers(self.count, |index| {
+                self.integer(index).unwrap_or(self.get(index).to_bits().cast_signed())
+            }),
         }
     }
 }
@@ -302,14 +310,21 @@ impl Fingerprint {
         self.0.rotate_left(1);
     }
 
-    fn bytes(&mut self, bytes: &[u8]) {
-        let (blocks, rest) = bytes.as_chunks::<32>();
-        for block in blocks {
-            let (words, _) = block.as_chunks::<8>();
-            for (state, word) in self.0.iter_mut().zip(words) {
-                *state = Self::mix(*state, u64::from_ne_bytes(*word));
+    /// Takes whole numbers in, most of which are below 2^32.
+    #[inline]
+    fn integers(&mut self, count: usize, value: impl Fn(usize) -> i64) {
+        let whole = count - count % 8;
+        let mut above = 0;
+        for first in (0..whole).step_by(8) {
+            for (lane, state) in self.0.iter_mut().enumerate() {
+                let [low, high] = [0, 1].map(|at| value(first + 2 * lane + at).cast_unsigned());
+                *state = Self::mix(*state, low & 0xffff_ffff | high << 32);
+                above |= (low | high) >> 32;
             }
         }
-        rest.iter().for_each(|byte| self.add(u64::from(*byte)));
+        (whole..count).for_each(|index| self.add(value(index).cast_unsigned()));
+        if above > 0 {
+            (0..whole).for_each(|index| self.add((value(index) >> 32).cast_unsigned()));
+        }
     }
 }

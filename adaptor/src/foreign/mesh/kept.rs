@@ -87,17 +87,20 @@ impl Kept {
             channel.vertex_count(),
             channel.blocks.iter().map(|block| block.domain.topology.cell_count()).sum(),
         );
-        if !looked_at && self.fingerprint.is_some() && counts == self.counts {
+        let single = channel.single();
+        let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
+        let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
+        let has_cells = lent_cells.is_some() || self.cells.is_some();
+        let has_points = lent_points || self.points.len() == counts.0;
+        let is_whole = self.fingerprint.is_some() && has_cells && has_points;
+        if !looked_at && is_whole && counts == self.counts {
             return Ok(false);
         }
         channel.check_memory()?;
-        let single = channel.single();
-        let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
         let fingerprint = channel.fingerprint();
         let is_same = self.fingerprint == Some(fingerprint);
         let is_other = self.passed.is_some_and(|(passed, _)| passed != fingerprint);
         self.counts = counts;
-        let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         if !lent_points || (!is_same && lent_cells.is_none()) {
             self.points.clear();
             if self.points.try_reserve(counts.0).is_err() {
@@ -128,12 +131,9 @@ impl Kept {
             self.marks = marks(channel)?;
             self.boxes.clone_from(&channel.boxes);
             self.fingerprint = Some(fingerprint);
-        } else if let Some(address) = lent_cells
-            && self.cells.is_none()
-            && address != self.address
-        {
-            // A solver that copies its cells anew for each step: one copy here, by which they are
-            // known from now on.
+        } else if self.cells.is_none() && lent_cells.is_none_or(|address| address != self.address) {
+            // A solver that copies its cells anew for each step, or has them in another form now:
+            // one copy here, by which they are known from now on.
             self.cells = Some(cells(channel, &self.points_of(channel))?);
         }
         if lent_points {
