@@ -1,6 +1,6 @@
 //! What is written is read back alike, by this crate and by VTK.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::*;
@@ -171,6 +171,29 @@ fn a_series_is_whole_after_every_entry() {
         assert!(text.ends_with("</Collection>\n</VTKFile>\n"));
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_series_names_files_from_where_it_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a/b/run.pvd");
+    let files = ["a/b/0/wall.vtu", "a/1.vtu", "c/2.vtu"].map(|file| folder.path().join(file));
+    let mut series = Series::create(&path).unwrap();
+    files.iter().for_each(|file| series.push(0.5, file).unwrap());
+    // Once more, at another time.
+    series.push(0.75, &files[2]).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    for file in ["0/wall.vtu", "../1.vtu", "../../c/2.vtu"] {
+        assert_eq!(text.matches(&format!("file=\"{file}\"")).count(), 1, "{text}");
+    }
+    let found: Vec<(f64, PathBuf)> = Series::entries(&path).unwrap().collect();
+    let of = |file: &str| folder.path().join("a/b").join(file);
+    let expected = [(0.5, of("0/wall.vtu")), (0.5, of("../1.vtu")), (0.75, of("../../c/2.vtu"))];
+    assert_eq!(found, expected);
+    // What is read back is written as it was.
+    Series::of(&path, found.into_iter()).unwrap();
+    assert_eq!(Series::entries(&path).unwrap().collect::<Vec<_>>(), expected);
+    assert_eq!(Series::entries(&folder.path().join("none.pvd")).unwrap().count(), 0);
 }
 
 /// Runs `tests/vtk/read_back.py` with Debian's VTK; `None` where the environment says that there is
