@@ -84,6 +84,25 @@ fn a_run_is_recorded_without_a_viewer_and_without_a_server() {
 }
 
 #[test]
+fn a_run_goes_on_below_a_recording_that_is_damaged_in_the_middle() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("run.tombolo");
+    record(output.path(), "", 20);
+    let mut damaged = std::fs::read(&file).unwrap();
+    // The head of a message, 41 bytes before its text.
+    let texts = damaged.windows(9).enumerate().filter(|(_, bytes)| bytes == b"{\"monitor");
+    let at = texts.map(|(at, _)| at - 41).nth(2).expect("a third one");
+    damaged[at] ^= 1;
+    std::fs::write(&file, &damaged).unwrap();
+    let before = Recording::open(&file).unwrap();
+    record(output.path(), "", 5);
+    assert!(std::fs::read(&file).unwrap().starts_with(&damaged), "nothing is cut off");
+    let after = Recording::open(&file).unwrap();
+    assert!(before.lost_bytes() > 41 && after.lost_bytes() == before.lost_bytes());
+    assert!(after.last().seconds > before.last().seconds);
+}
+
+#[test]
 fn a_recording_has_a_limit_and_the_run_goes_on() {
     let output = tempfile::tempdir().unwrap();
     let file = output.path().join("run.tombolo");

@@ -242,8 +242,7 @@ fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
         let still: Vec<[f64; 3]> =
             sheet.iter().map(|point| point.map(|x| offset + size * x)).collect();
         let coded = check(&still, &triangles, &[], bound / 2.0);
-        let [mut motion, mut copy] =
-            [Motion::new(&coded.topology), Motion::new(&coded.topology)];
+        let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
         let mut state = 1_u64;
         let mut random = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

@@ -24,7 +24,7 @@
 mod format;
 mod reader;
 
-pub(crate) use format::{HEAD, Head, Kind, MAGIC, read_head, write};
+pub(crate) use format::{HEAD, Head, Kind, MAGIC, find_head, write};
 pub use reader::{Moment, RecordError, Recorded, RecordedMessage, Recording};
 
 #[cfg(test)]
@@ -81,6 +81,9 @@ mod tests {
             assert_eq!(recording.read_next().unwrap().unwrap().moment.cycle, expected, "{seconds}");
         }
         assert_eq!(recording.seconds_of_cycle(22), 2.2);
+        // Also to where no key frame is.
+        assert_eq!(recording.seconds_of_cycle(25), 2.5);
+        assert_eq!(recording.seconds_of_time(0.1 * 37.0), 3.7);
         assert_eq!(recording.seconds_of_time(99.0), 5.9);
         assert_eq!(
             recording.orders(1.35),
@@ -120,6 +123,26 @@ mod tests {
             assert!(found.iter().all(|message| expected.contains(message)), "{at}");
             recording.seek(3.0);
             let _ = (recording.read_next(), recording.hello(3.0), recording.orders(3.0));
+        }
+    }
+
+    #[test]
+    fn what_lies_behind_a_damaged_head_is_found_again() {
+        let whole = bytes();
+        let expected = all(&mut opened(&whole).unwrap());
+        // The key frame of view 0 at cycle 11: its next frames, 15, cannot be shown without it.
+        let at = whole.windows(6).position(|bytes| bytes == b"key 11").unwrap() - HEAD;
+        for byte in at..at + HEAD {
+            let mut damaged = whole.clone();
+            damaged[byte] ^= 0x10;
+            let mut recording = opened(&damaged).unwrap();
+            assert_eq!(recording.lost_bytes(), HEAD as u64 + 6, "byte {}", byte - at);
+            assert_eq!(recording.last().cycle, 59);
+            let found: Vec<u64> = all(&mut recording).iter().map(|it| it.moment.cycle).collect();
+            let seen = expected.iter().map(|it| it.moment.cycle);
+            // Nor is it known whose frame the damaged one was.
+            let without: Vec<u64> = seen.filter(|cycle| ![11, 15].contains(cycle)).collect();
+            assert_eq!(found, without, "byte {}", byte - at);
         }
     }
 

@@ -85,7 +85,8 @@ impl Motion {
         if near(&self.now, &wanted, bound) {
             message.push(STILL);
             self.is_free = false;
-        } else if let Some((number, along)) = self.along(&wanted).filter(|of| near(&of.1, &wanted, bound))
+        } else if let Some((number, along)) =
+            self.along(&wanted).filter(|of| near(&of.1, &wanted, bound))
         {
             message.push(ALONG);
             message.extend(number.to_le_bytes());
