@@ -178,3 +178,64 @@ fn viewers_go_through_a_recording() {
     let errors = viewer.seen.iter().filter(|told| told.get("error").is_some()).count();
     assert!((1..1500).contains(&errors), "{errors} errors");
 }
+
+#[test]
+fn runs_and_views_are_exported_to_files_of_their_own() {
+    let output = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "record": "run.tombolo", "pipelines": [
+        {"name": "wall two", "stages": [{"surface": {}}, {"stream": {}}]},
+        {"name": "wall_two", "stages": [{"surface": {}}, {"select": {"fields": []}}, {"stream": {}}]},
+        {"name": "health", "stages": [{"quality": {}}]}]}"#;
+    let mut cycles = Vec::new();
+    for steps in [6, 3] {
+        let settings =
+            Settings { config: config(text), output: output.path().into(), ..Settings::default() };
+        let mut solver = Solver::new(settings);
+        for _ in 0..steps {
+            solver.step();
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        solver.finish();
+    }
+    let mut decoder = Decoder::new();
+    for recorded in all(&output.path().join("run.tombolo")) {
+        if let RecordedMessage::Frame { bytes, .. } = &recorded.message {
+            let frame = decoder.decode(bytes).unwrap();
+            cycles.push((frame.view, frame.cycle));
+        }
+    }
+    let again = cycles.iter().filter(|it| cycles.iter().filter(|other| other == it).count() > 1);
+    assert!(again.count() > 0, "both runs show the same cycle: {cycles:?}");
+    let exported = std::process::Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args([
+            "export",
+            "run.tombolo",
+            "--out",
+            "out",
+            "--vtk",
+            "--csv",
+            "--png",
+            "--color-by",
+            "speed",
+        ])
+        .current_dir(output.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&exported.stdout);
+    assert!(exported.status.success(), "{said}{}", String::from_utf8_lossy(&exported.stderr));
+    assert!(said.contains("wall_two: drawn without colours"), "{said}");
+    let out = output.path().join("out");
+    let count = |ending: &str| {
+        let entries = std::fs::read_dir(&out).unwrap();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(ending)).count()
+    };
+    assert_eq!((count(".vtp"), count(".png")), (cycles.len(), cycles.len()));
+    assert_eq!((count(".pvd"), count(".csv")), (4, 1));
+    let mut entries = 0;
+    for name in ["wall_two", "wall_two-2", "wall_two-run-2", "wall_two-run-2-2"] {
+        let series = std::fs::read_to_string(out.join(format!("{name}.pvd"))).expect(name);
+        entries += series.matches("<DataSet ").count();
+    }
+    assert_eq!(entries, cycles.len());
+}
