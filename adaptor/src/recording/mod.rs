@@ -29,6 +29,14 @@ pub use reader::{Moment, RecordError, Recorded, RecordedMessage, Recording};
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+    use tombolo_deform::mesh::{CellType, Cells};
+    use tombolo_pipelines::{
+        encode::Encoder,
+        extract::Extract,
+        run::{Encoding, Frame},
+    };
+
     use super::*;
 
     /// A recording of two views: a key frame of each every ten messages.
@@ -90,6 +98,72 @@ mod tests {
             ["{\"order\":{\"id\":\"o3\"}}", "{\"order\":{\"id\":\"o13\"}}"]
         );
         assert_eq!(recording.hello(0.5).as_deref(), Some("{\"hello\":{}}"));
+    }
+
+    /// A key frame.
+    fn frame(view: &str, cycle: u64) -> Vec<u8> {
+        let cells = Cells::uniform(CellType::Triangle, vec![0, 1, 2]).unwrap();
+        let extract = Extract {
+            points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            vertices: None,
+            cells: cells.into(),
+            features: None,
+            fields: Vec::new(),
+        };
+        let (time, encoding) = (cycle as f64, Encoding::default());
+        let frame = Frame { pipeline: view.into(), cycle, time, extract: extract.into(), encoding };
+        Encoder::new().encode(&frame, false).unwrap().with_topology().to_vec()
+    }
+
+    #[test]
+    fn no_view_is_shown_from_before_its_newest_key_frame_nor_one_that_is_gone() {
+        let hello = |views: &[&str]| {
+            let views: Vec<_> = views.iter().map(|name| json!({"name": name})).collect();
+            (Kind::Hello, 0, json!({"hello": {"views": views}}).to_string().into_bytes())
+        };
+        let key = |number: u32, view: &str, cycle| (Kind::KeyFrame, number, frame(view, cycle));
+        let next = |number: u32| (Kind::NextFrame, number, b"next".to_vec());
+        let messages = [
+            hello(&["rare", "often", "gone", "replaced"]),
+            key(0, "rare", 1),
+            key(1, "often", 2),
+            key(2, "gone", 3),
+            key(3, "replaced", 4),
+            next(0),
+            next(1),
+            hello(&["rare", "often", "replaced"]),
+            key(4, "replaced", 8),
+            key(1, "often", 9),
+            next(3),
+            next(1),
+            hello(&["rare", "often", "replaced", "gone"]),
+            key(5, "gone", 13),
+        ];
+        let mut out = MAGIC.to_vec();
+        for (number, (kind, view, message)) in (0..).zip(&messages) {
+            let moment = (number, number as f64);
+            let head = Head::of(*kind, *view, moment, 1000 * number, message).unwrap();
+            write(&mut out, &head, message).unwrap();
+        }
+        let mut recording = opened(&out).unwrap();
+        let mut shown = |seconds: f64| {
+            recording.seek(seconds);
+            let mut cycles = Vec::new();
+            while recording.next_moment().is_some_and(|next| next.seconds <= seconds) {
+                let recorded = recording.read_next().unwrap().unwrap();
+                if let RecordedMessage::Frame { .. } = recorded.message {
+                    cycles.push(recorded.moment.cycle);
+                }
+            }
+            cycles
+        };
+        assert_eq!(shown(6.5), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(shown(11.5), [1, 5, 8, 9, 11]);
+        assert_eq!(shown(13.0), [1, 5, 8, 9, 11, 13]);
+        // What follows the moment is shown as it comes.
+        assert_eq!(shown(11.5), [1, 5, 8, 9, 11]);
+        let rest: Vec<u64> = all(&mut recording).iter().map(|it| it.moment.cycle).collect();
+        assert_eq!(rest, [12, 13]);
     }
 
     #[test]

@@ -6,6 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use serde_json::Value;
+use tombolo_pipelines::encode::view_of;
+
 use super::format::{HEAD, Head, Kind, MAGIC, find_head, read_head, read_message};
 
 /// Key frames whose places are kept, and steps whose moments are; in a longer recording every other
@@ -98,6 +101,13 @@ impl<T> Thinned<T> {
     }
 }
 
+/// The names of the views that a greeting lists; `None` where it has no list.
+fn names_of_views(hello: &str) -> Option<Vec<String>> {
+    let hello: Value = serde_json::from_str(hello).ok()?;
+    let views = hello["hello"]["views"].as_array()?;
+    Some(views.iter().filter_map(|view| view["name"].as_str()).map(str::to_owned).collect())
+}
+
 /// A message of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
@@ -145,6 +155,8 @@ pub struct Recording {
     next: u64,
     /// The views whose frames can be shown: their key frame was read since the last seek.
     shown: Vec<u32>,
+    /// From which place on key frames of views are shown since the last seek; of others all are.
+    from: Vec<(u32, u64)>,
 }
 
 impl Recording {
@@ -181,6 +193,7 @@ impl Recording {
             stacks: Vec::new(),
             next: MAGIC.len() as u64,
             shown: Vec::new(),
+            from: Vec::new(),
         };
         recording.look_through().map_err(failed)?;
         if recording.hellos.is_empty() {
@@ -255,6 +268,9 @@ impl Recording {
         let failed = |source| RecordError::File { file: path.clone(), source };
         while let Some((at, head)) = self.next_head().map_err(failed)? {
             self.next = at + HEAD as u64 + u64::from(head.length);
+            if self.is_past(at, &head) {
+                continue;
+            }
             let recorded = self.message(at, &head).map_err(failed)?;
             if self.can_be_shown(&head, recorded.is_some())
                 && let Some(recorded) = recorded
@@ -276,6 +292,12 @@ impl Recording {
         Ok(found)
     }
 
+    /// Whether a message is a key frame of a view that is shown from a later one on.
+    fn is_past(&self, at: u64, head: &Head) -> bool {
+        head.kind == Kind::KeyFrame
+            && self.from.iter().any(|&(view, from)| view == head.view && at < from)
+    }
+
     /// Whether a message can be shown: of frames those whose key frame was read since the last seek,
     /// with nothing damaged in between.
     fn can_be_shown(&mut self, head: &Head, is_sound: bool) -> bool {
@@ -295,7 +317,8 @@ impl Recording {
     /// When the next message came that can be shown; `None` at the end.
     pub fn next_moment(&mut self) -> Option<Moment> {
         while let Some((at, head)) = self.next_head().ok()? {
-            if head.kind != Kind::NextFrame || self.shown.contains(&head.view) {
+            let is_shown = head.kind != Kind::NextFrame || self.shown.contains(&head.view);
+            if is_shown && !self.is_past(at, &head) {
                 return Some(Moment::of(&head));
             }
             self.next = at + HEAD as u64 + u64::from(head.length);
@@ -324,9 +347,9 @@ impl Recording {
         }
     }
 
-    /// Goes to a moment: the next message will be the key frame from which the first view to come can
-    /// be shown, where all views that have one before then can. Texts before the moment are to be
-    /// passed over.
+    /// Goes to a moment: the next messages will be the newest key frame before then of each view that
+    /// the greeting of that moment lists, and what came behind it; of no view comes anything older.
+    /// Texts before the moment are to be passed over.
     pub fn seek(&mut self, seconds: f64) {
         let upto = self.keys.kept.partition_point(|key| key.moment.seconds <= seconds);
         let mut newest: Vec<Place> = Vec::new();
@@ -339,8 +362,36 @@ impl Recording {
                 break;
             }
         }
+        let mut listed = self.hello(seconds).and_then(|hello| names_of_views(&hello));
         self.shown.clear();
-        self.next = newest.iter().map(|key| key.at).min().unwrap_or(MAGIC.len() as u64);
+        self.from.clear();
+        let mut first = None;
+        // The newest first: a view that was replaced has the name of the one that came after it.
+        for key in newest {
+            let is_listed = match (&mut listed, self.view_at(key)) {
+                (Some(listed), Some(name)) => {
+                    let place = listed.iter().position(|known| *known == name);
+                    place.map(|place| listed.swap_remove(place)).is_some()
+                }
+                // What cannot be told is shown.
+                _ => true,
+            };
+            if is_listed {
+                first = Some(key.at);
+            }
+            self.from.push((key.view, if is_listed { key.at } else { key.at + 1 }));
+        }
+        let oldest = self.from.iter().map(|(_, from)| *from).min();
+        self.next = first.or(oldest).unwrap_or(MAGIC.len() as u64);
+    }
+
+    /// The name of the view that a frame is of.
+    fn view_at(&mut self, place: Place) -> Option<String> {
+        let head = read_head(&mut self.file, place.at).ok()??;
+        match self.message(place.at, &head).ok()??.message {
+            RecordedMessage::Frame { bytes, .. } => view_of(&bytes).ok(),
+            RecordedMessage::Text(_) => None,
+        }
     }
 
     /// The moment of a cycle: that of the first message of it or a later one. In a recording of more

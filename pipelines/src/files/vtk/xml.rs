@@ -263,7 +263,7 @@ impl<'a> Document<'a> {
 
     fn array(&self, element: &Element, tuples: Option<usize>) -> Result<Array, Flaw> {
         let numbers = self.numbers(element, tuples).map_err(at(element.position))?;
-        let number = from_xml(&element.kind).map_or(NumberType::default(), Stored::number);
+        let number = from_xml(&element.kind).map(Stored::number).unwrap_or_default();
         Ok(Array { name: element.name.clone(), components: element.components, number, numbers })
     }
 
