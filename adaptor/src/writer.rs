@@ -183,8 +183,8 @@ impl Written {
         })
     }
 
-    /// Writes a picture to its file, or adds it to its database, which the first of a run begins; after
-    /// a restart it goes on.
+    /// Writes a picture to its file, or adds it to its database. The first of a run begins the
+    /// database; after a restart it goes on.
     fn draw(&mut self, job: &Job, picture: &Picture, cycle: u64) -> Result<(), String> {
         if job.path.extension().is_none_or(|extension| extension != "cdb") {
             return files::write_picture(&job.path, &picture.image).map_err(told);

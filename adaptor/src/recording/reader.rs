@@ -282,8 +282,8 @@ impl Recording {
         Ok(None)
     }
 
-    /// The next message, and its place. Where one before it is damaged, nobody knows whose frame that
-    /// was: views are shown again from their next key frames on.
+    /// The next message, and its place. Where one before it is damaged, nobody knows whose frame
+    /// that was: views are shown again from their next key frames on.
     fn next_head(&mut self) -> io::Result<Option<(u64, Head)>> {
         let found = find_head(&mut self.file, self.next, self.end)?;
         if found.is_some_and(|(at, _)| at > self.next) {

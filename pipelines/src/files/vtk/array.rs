@@ -48,8 +48,8 @@ impl Stored {
         }
     }
 
-    /// The first `count` values from their bytes, or all; bytes beyond the last whole number are not
-    /// looked at.
+    /// The first `count` values from their bytes, or all, where they are bits; of numbers always all.
+    /// Bytes beyond the last whole number are not looked at.
     pub fn decode(self, bytes: &[u8], big_endian: bool, count: Option<u64>) -> Numbers {
         let number = match self {
             Stored::Number(number) => number,
