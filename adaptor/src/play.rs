@@ -45,7 +45,7 @@ impl Playback {
         let recording = Recording::open(file)?;
         if recording.lost_bytes() > 0 {
             log::warn!(
-                "{}: the last {} bytes cannot be read; what was recorded before is shown",
+                "{}: {} bytes cannot be read; what else was recorded is shown",
                 file.display(),
                 recording.lost_bytes()
             );

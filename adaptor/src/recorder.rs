@@ -16,7 +16,7 @@ use std::{
 use serde_json::{Value, json};
 
 use crate::{
-    recording::{HEAD, Head, Kind, MAGIC, RecordError, read_head, write},
+    recording::{HEAD, Head, Kind, MAGIC, RecordError, find_head, write},
     step::Moment,
     stream::{EXACT, Hub, Observed, Observer},
 };
@@ -234,13 +234,10 @@ impl Out {
             file.seek(SeekFrom::Start(0)).map_err(failed)?;
             file.write_all(MAGIC).map_err(failed)?;
         }
-        // What a killed run left half-written is cut off.
-        while let Some(head) = read_head(&mut file, end).map_err(failed)? {
-            let next = end + HEAD as u64 + u64::from(head.length);
-            if next > length {
-                break;
-            }
-            (end, before) = (next, head.milliseconds + 1);
+        // What a killed run left half-written is cut off; what lies behind a damaged head is not.
+        while let Some((at, head)) = find_head(&mut file, end, length).map_err(failed)? {
+            end = at + HEAD as u64 + u64::from(head.length);
+            before = head.milliseconds.saturating_add(1);
         }
         file.set_len(end).map_err(failed)?;
         file.seek(SeekFrom::Start(end)).map_err(failed)?;

@@ -24,7 +24,7 @@ use crate::{
     steering::Parameter,
     step::{Moment, Outside},
     stream::{COARSER, Hub, LEVELS},
-    writer::{Content, Job, Writer},
+    writer::{Content, Job, Membership, Writer},
 };
 
 /// The pipelines of a run.
@@ -190,8 +190,15 @@ impl Pipelines {
         self.runner.save(writer);
     }
 
-    /// Goes on from what was written down.
-    pub(crate) fn restore(&mut self, saved: &[u8]) -> Result<(), CheckpointError> {
+    /// Goes on from what was written down, after a step where there was one.
+    pub(crate) fn restore(
+        &mut self,
+        saved: &[u8],
+        last: Option<Moment>,
+    ) -> Result<(), CheckpointError> {
+        if let Some(last) = last {
+            self.writer.resume(last);
+        }
         Ok(self.runner.restore(&mut communicator::Reader::new(0, saved))?)
     }
 
@@ -301,9 +308,11 @@ impl Pipelines {
                         self.send(frame, hub);
                     }
                 }
-                Output::Write { pipeline, path, time, extract, keep, .. } => {
+                Output::Write { pipeline, path, time, extract, series, keep, .. } => {
                     let path = self.output.join(path);
-                    let content = Content::Extract(extract, keep);
+                    let series = series.map(|series| self.output.join(series));
+                    let membership = series.map(|series| Membership { series, keep });
+                    let content = Content::Extract(extract, membership);
                     self.writer.write(Job { pipeline, path, time, content });
                 }
                 Output::Picture { pipeline, path, cycle, time, picture } => {

@@ -74,8 +74,8 @@ impl OpenTable {
     }
 }
 
-/// The first line.
-fn head(titles: &[String]) -> String {
+/// The first line of a table whose columns behind `cycle` and `time` have these titles.
+pub(crate) fn head(titles: &[String]) -> String {
     let quoted = |title: &String| match title.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", title.replace('"', "\"\"")),
         false => title.clone(),

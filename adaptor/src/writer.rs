@@ -1,9 +1,10 @@
 //! Writes files on a thread of its own.
 
+mod series;
+
 use std::{
-    collections::{HashMap, VecDeque, hash_map::Entry},
-    num::NonZeroU32,
-    path::{Path, PathBuf},
+    collections::{HashMap, hash_map::Entry},
+    path::PathBuf,
     sync::{
         Arc, Mutex,
         mpsc::{Receiver, SyncSender, sync_channel},
@@ -13,13 +14,16 @@ use std::{
 
 use tombolo_pipelines::{
     extract::Extract,
-    files::{self, Database, Series},
+    files::{self, Database},
     render::Picture,
     run::Table,
 };
 
 use crate::lock::lock;
+use crate::step::Moment;
 use crate::table::OpenTable;
+use series::AllSeries;
+pub(crate) use series::Membership;
 
 /// Files and rows that may wait to be written; the solver waits where the disk is slower than this.
 const WAITING: usize = 2;
@@ -36,8 +40,8 @@ pub(crate) struct Job {
 
 /// The content of a file.
 pub(crate) enum Content {
-    /// A file of its own; of the pipeline only so many stay.
-    Extract(Arc<Extract>, Option<NonZeroU32>),
+    /// A file of its own, and the series that it belongs to, where each step has another file.
+    Extract(Arc<Extract>, Option<Membership>),
     /// A picture of a step.
     Picture(Arc<Picture>, u64),
     /// A row of a table.
@@ -51,16 +55,22 @@ pub(crate) struct Writer {
     thread: Option<JoinHandle<()>>,
     faults: Arc<Mutex<Vec<String>>>,
     told: usize,
+    since: Option<Moment>,
 }
 
 impl Writer {
+    /// Lets series and databases go on as they were at this moment, where they are there.
+    pub(crate) fn resume(&mut self, since: Moment) {
+        self.since = Some(since);
+    }
+
     pub(crate) fn write(&mut self, job: Job) {
         if self.jobs.is_none() {
             let (jobs, next) = sync_channel(WAITING);
-            let faults = Arc::clone(&self.faults);
+            let (faults, since) = (Arc::clone(&self.faults), self.since);
             let spawned = std::thread::Builder::new()
                 .name("tombolo-write".into())
-                .spawn(move || work(&next, &faults));
+                .spawn(move || work(&next, &faults, since));
             match spawned {
                 Ok(thread) => (self.jobs, self.thread) = (Some(jobs), Some(thread)),
                 Err(error) => {
@@ -105,29 +115,28 @@ fn note(faults: &Mutex<Vec<String>>, fault: String) {
 }
 
 /// The files written so far.
-#[derive(Default)]
 struct Written {
-    /// Of each pipeline.
-    files: HashMap<Arc<str>, Files>,
+    series: AllSeries,
     /// Databases of pictures, by path.
     databases: HashMap<PathBuf, Database>,
     /// By path; `None` where a table cannot be written, which has been told.
     tables: HashMap<PathBuf, Option<OpenTable>>,
+    /// The cycle of the checkpoint that the run went on from.
+    since: Option<u64>,
 }
 
-/// The files that a pipeline has written: its first file, and the series once there is a second.
-enum Files {
-    One(PathBuf, f64),
-    Many(Series),
-    /// The newest ones, the oldest first.
-    Kept(VecDeque<(PathBuf, f64)>),
-}
-
-fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>) {
-    let mut written = Written::default();
+fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>, since: Option<Moment>) {
+    let mut written = Written {
+        series: AllSeries::new(since.map(|since| since.time)),
+        databases: HashMap::new(),
+        tables: HashMap::new(),
+        since: since.map(|since| since.cycle),
+    };
     while let Ok(job) = jobs.recv() {
         let outcome = match &job.content {
-            Content::Extract(extract, keep) => written.extract(&job, extract, *keep),
+            Content::Extract(extract, membership) => {
+                written.extract(&job, extract, membership.as_ref())
+            }
             Content::Picture(picture, cycle) => written.draw(&job, picture, *cycle),
             Content::Row(table, cycle, values) => written.row(&job, table, *cycle, values),
         };
@@ -146,58 +155,11 @@ impl Written {
         &mut self,
         job: &Job,
         extract: &Extract,
-        keep: Option<NonZeroU32>,
+        membership: Option<&Membership>,
     ) -> Result<(), String> {
         files::write(&job.path, extract).map_err(told)?;
-        let series = || {
-            let directory = job.path.parent().unwrap_or(Path::new("."));
-            directory.join(format!("{}.pvd", job.pipeline))
-        };
-        if let Some(keep) = keep {
-            let files = self.files.entry(Arc::clone(&job.pipeline));
-            let files = files.or_insert_with(|| Files::Kept(VecDeque::new()));
-            if !matches!(files, Files::Kept(_)) {
-                // The pipeline was replaced: what it wrote before all stays.
-                *files = Files::Kept(VecDeque::new());
-            }
-            let Files::Kept(kept) = files else { return Ok(()) };
-            if kept.back().is_some_and(|(path, _)| *path == job.path) {
-                kept.pop_back();
-            }
-            kept.push_back((job.path.clone(), job.time));
-            let mut gone = Vec::new();
-            while kept.len() > keep.get() as usize {
-                gone.extend(kept.pop_front());
-            }
-            // The series never names a file that is not there.
-            if kept.len() > 1 || !gone.is_empty() {
-                let shown = kept.iter().map(|(path, time)| (*time, &**path));
-                Series::of(&series(), shown).map_err(told)?;
-            }
-            return gone.iter().try_for_each(|(path, _)| files::remove(path).map_err(told));
-        }
-        match self.files.get_mut(&job.pipeline) {
-            None => {
-                let first = Files::One(job.path.clone(), job.time);
-                self.files.insert(Arc::clone(&job.pipeline), first);
-            }
-            Some(Files::One(path, _)) if *path == job.path => {}
-            Some(Files::One(path, time)) => {
-                let mut series = Series::create(&series()).map_err(told)?;
-                series.push(*time, path).map_err(told)?;
-                series.push(job.time, &job.path).map_err(told)?;
-                self.files.insert(Arc::clone(&job.pipeline), Files::Many(series));
-            }
-            Some(Files::Many(series)) => series.push(job.time, &job.path).map_err(told)?,
-            Some(Files::Kept(kept)) => {
-                // The pipeline was replaced: from now on all stay.
-                let kept = kept.iter().map(|(path, time)| (*time, &**path));
-                let mut all = Series::of(&series(), kept).map_err(told)?;
-                all.push(job.time, &job.path).map_err(told)?;
-                self.files.insert(Arc::clone(&job.pipeline), Files::Many(all));
-            }
-        }
-        Ok(())
+        let Some(membership) = membership else { return Ok(()) };
+        self.series.add(&job.pipeline, membership, &job.path, job.time).map_err(told)
     }
 
     fn row(&mut self, job: &Job, table: &Table, cycle: u64, row: &[f64]) -> Result<(), String> {
@@ -221,13 +183,18 @@ impl Written {
         })
     }
 
-    /// Writes a picture to its file, or adds it to its database, which the first of a run begins.
+    /// Writes a picture to its file, or adds it to its database. The first of a run begins the
+    /// database; after a restart it goes on.
     fn draw(&mut self, job: &Job, picture: &Picture, cycle: u64) -> Result<(), String> {
         if job.path.extension().is_none_or(|extension| extension != "cdb") {
             return files::write_picture(&job.path, &picture.image).map_err(told);
         }
         if !self.databases.contains_key(&job.path) {
-            let database = Database::create(&job.path).map_err(told)?;
+            let database = match self.since {
+                Some(cycle) => Database::resume(&job.path, cycle),
+                None => Database::create(&job.path),
+            };
+            let database = database.map_err(told)?;
             self.databases.insert(job.path.clone(), database);
         }
         match self.databases.get_mut(&job.path) {

@@ -84,6 +84,25 @@ fn a_run_is_recorded_without_a_viewer_and_without_a_server() {
 }
 
 #[test]
+fn a_run_goes_on_below_a_recording_that_is_damaged_in_the_middle() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("run.tombolo");
+    record(output.path(), "", 20);
+    let mut damaged = std::fs::read(&file).unwrap();
+    // The head of a message, 41 bytes before its text.
+    let texts = damaged.windows(9).enumerate().filter(|(_, bytes)| bytes == b"{\"monitor");
+    let at = texts.map(|(at, _)| at - 41).nth(2).expect("a third one");
+    damaged[at] ^= 1;
+    std::fs::write(&file, &damaged).unwrap();
+    let before = Recording::open(&file).unwrap();
+    record(output.path(), "", 5);
+    assert!(std::fs::read(&file).unwrap().starts_with(&damaged), "nothing is cut off");
+    let after = Recording::open(&file).unwrap();
+    assert!(before.lost_bytes() > 41 && after.lost_bytes() == before.lost_bytes());
+    assert!(after.last().seconds > before.last().seconds);
+}
+
+#[test]
 fn a_recording_has_a_limit_and_the_run_goes_on() {
     let output = tempfile::tempdir().unwrap();
     let file = output.path().join("run.tombolo");
@@ -158,4 +177,68 @@ fn viewers_go_through_a_recording() {
     viewer.look_for("nothing", Duration::from_millis(600), |_| true);
     let errors = viewer.seen.iter().filter(|told| told.get("error").is_some()).count();
     assert!((1..1500).contains(&errors), "{errors} errors");
+}
+
+#[test]
+fn runs_and_views_are_exported_to_files_of_their_own() {
+    let output = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "record": "run.tombolo", "pipelines": [
+        {"name": "wall two", "stages": [{"surface": {}}, {"stream": {}}]},
+        {"name": "wall_two", "stages": [{"surface": {}}, {"select": {"fields": []}}, {"stream": {}}]},
+        {"name": "health", "stages": [{"quality": {}}]}]}"#;
+    let mut cycles = Vec::new();
+    for steps in [6, 3] {
+        let settings =
+            Settings { config: config(text), output: output.path().into(), ..Settings::default() };
+        let mut solver = Solver::new(settings);
+        for _ in 0..steps {
+            solver.step();
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        solver.finish();
+    }
+    let (mut decoder, mut last) = (Decoder::new(), std::collections::BTreeMap::new());
+    for recorded in all(&output.path().join("run.tombolo")) {
+        if let RecordedMessage::Frame { bytes, .. } = &recorded.message {
+            let frame = decoder.decode(bytes).unwrap();
+            // One that was sent again is the same file.
+            if last.insert(frame.view.clone(), frame.cycle) != Some(frame.cycle) {
+                cycles.push((frame.view, frame.cycle));
+            }
+        }
+    }
+    let again = cycles.iter().filter(|it| cycles.iter().filter(|other| other == it).count() > 1);
+    assert!(again.count() > 0, "both runs show the same cycle: {cycles:?}");
+    let exported = std::process::Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args([
+            "export",
+            "run.tombolo",
+            "--out",
+            "out",
+            "--vtk",
+            "--csv",
+            "--png",
+            "--color-by",
+            "speed",
+        ])
+        .current_dir(output.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&exported.stdout);
+    assert!(exported.status.success(), "{said}{}", String::from_utf8_lossy(&exported.stderr));
+    assert!(said.contains("wall_two: drawn without colours"), "{said}");
+    let out = output.path().join("out");
+    let count = |ending: &str| {
+        let entries = std::fs::read_dir(&out).unwrap();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(ending)).count()
+    };
+    assert_eq!((count(".vtp"), count(".png")), (cycles.len(), cycles.len()));
+    assert_eq!((count(".pvd"), count(".csv")), (4, 1));
+    let mut entries = 0;
+    for name in ["wall_two", "wall_two-2", "wall_two-run-2", "wall_two-run-2-2"] {
+        let series = std::fs::read_to_string(out.join(format!("{name}.pvd"))).expect(name);
+        entries += series.matches("<DataSet ").count();
+    }
+    assert_eq!(entries, cycles.len());
 }

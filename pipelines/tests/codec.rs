@@ -234,6 +234,40 @@ fn a_mesh_that_moves_in_a_line_sends_it_once() {
     assert!(lost, "nothing is known of the line");
 }
 
+/// Where the bound is near the rounding of the coordinates, or below that of the displacement.
+#[test]
+fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
+    let (sheet, triangles) = sheet(20);
+    for (offset, size, bound) in [(1000.0, 1.0, 2.9e-13), (5e6, 1.0, 2.5e-9), (0.0, 1e6, 1e-12)] {
+        let still: Vec<[f64; 3]> =
+            sheet.iter().map(|point| point.map(|x| offset + size * x)).collect();
+        let coded = check(&still, &triangles, &[], bound / 2.0);
+        let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
+        let mut state = 1_u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for frame in 0..12 {
+            // Near the reference, then near zero or moved by a little.
+            let near = if frame < 6 || offset > 0.0 { 1.0 } else { 0.0 };
+            let points: Vec<[f64; 3]> =
+                still.iter().map(|point| point.map(|x| near * x + 0.1 * random())).collect();
+            let mut message = Vec::new();
+            motion.encode(&coded.topology, &coded.points, &points, bound, &mut message).unwrap();
+            let mut rest = &message[..];
+            let read = copy.decode(&coded.topology, &mut rest).unwrap();
+            assert!(rest.is_empty() && read == motion.positions());
+            for (read, &point) in read.iter().zip(&coded.points) {
+                for axis in 0..3 {
+                    let off = (read[axis] - points[point as usize][axis]).abs();
+                    assert!(off <= bound, "at {offset}, frame {frame}: {off}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn the_same_input_gives_the_same_bytes() {
     let (points, triangles) = sheet(25);

@@ -237,6 +237,15 @@ fn what_means_nothing_is_refused_with_its_place() {
             "another pipeline writes the file `a.csv`",
         ),
         (
+            r#"{"name": "a", "stages": [{"render": {"file": "a.cdb"}}, {"render": {"file": "a.cdb", "field": "p"}}]}"#.into(),
+            "pipelines[0]: two `render` write the database `a.cdb`",
+        ),
+        (
+            r#"{"name": "a", "stages": [{"render": {"file": "a.cdb"}}]},
+                {"name": "b", "stages": [{"render": {"file": "b.cdb"}}], "when": "cycle > 1", "then": [{"render": {"file": "a.cdb"}}]}"#.into(),
+            "pipelines[1]: two `render` write the database `a.cdb`",
+        ),
+        (
             r#"{"name": "a", "stages": [{"csv": {"file": "a.txt"}}]}"#.into(),
             "csv.file: found the file `a.txt`, expected one that ends in `.csv`",
         ),

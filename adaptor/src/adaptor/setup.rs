@@ -104,7 +104,8 @@ impl Adaptor {
         let mut pipelines = Pipelines::new(&config, Arc::clone(&communicator), &output)?;
         if let Some(Continued { checkpoint, .. }) = &continued {
             log.resume(checkpoint.run.known.clone());
-            pipelines.restore(&checkpoint.pipelines)?;
+            let last = checkpoint.run.has_begun.then_some(moment);
+            pipelines.restore(&checkpoint.pipelines, last)?;
         }
         log.expect(orders.iter().filter_map(|timed| timed.id.as_deref()));
         let changes = Arc::new(Changes::new(

@@ -19,6 +19,7 @@ use crate::{
         render::draw,
     },
     recording::{RecordedMessage, Recording},
+    table::head,
 };
 use clap::Args;
 use serde_json::Value;
@@ -57,8 +58,31 @@ pub(crate) struct Options {
 struct View {
     cells: Arc<Cells>,
     seen: usize,
-    series: Option<Series>,
     written: usize,
+    /// What its files of this run are called.
+    name: String,
+    series: Option<Series>,
+    /// How many runs have shown it so far.
+    runs: usize,
+    /// The cycle of its last frame, and how many greetings came before it.
+    last: Option<(u64, usize)>,
+    /// Why pictures lack the colours that were asked for.
+    plain: Option<String>,
+}
+
+/// The names of files that are taken.
+#[derive(Default)]
+struct Names(BTreeSet<String>);
+
+impl Names {
+    /// The name of the files of a view or a pipeline, which no other has.
+    fn take(&mut self, name: &str) -> String {
+        let plain = file_name(name);
+        let all = std::iter::once(plain.clone()).chain((2..).map(|n| format!("{plain}-{n}")));
+        // Some file systems do not tell capitals from others.
+        let mut free = all.filter(|name| self.0.insert(name.to_lowercase()));
+        free.next().unwrap_or(plain)
+    }
 }
 
 /// The monitors of a pipeline.
@@ -79,39 +103,57 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
     let (vtk, csv) = (options.vtk || is_all, options.csv || is_all);
     let mut decoder = Decoder::new();
     let mut views: BTreeMap<String, View> = BTreeMap::new();
+    let mut names = Names::default();
     let mut tables: BTreeMap<String, Table> = BTreeMap::new();
     let mut undecoded = 0_usize;
-    while let Some(recorded) = recording.read_next()? {
-        match recorded.message {
+    let mut greetings = 0_usize;
+    let mut take = |recorded: RecordedMessage| -> Result<(), Failure> {
+        match recorded {
             RecordedMessage::Frame { bytes, .. } if vtk || options.png => {
                 // One that goes on from a damaged one; the next key frame is of use again.
                 let Ok(frame) = decoder.decode(&bytes) else {
                     undecoded += 1;
-                    continue;
+                    return Ok(());
                 };
                 if options.view.as_ref().is_none_or(|name| *name == frame.view) {
                     let view = views.entry(frame.view.clone()).or_default();
+                    view.go_on(&frame, greetings, &mut names);
                     view.take(frame, options, vtk)?;
                 }
             }
+            RecordedMessage::Text(text) if text.starts_with("{\"hello\"") => greetings += 1,
             RecordedMessage::Text(text) if csv && text.starts_with("{\"monitor\"") => {
                 add(&mut tables, &text);
             }
             _ => {}
         }
+        Ok(())
+    };
+    let mut outcome = Ok(());
+    while let Some(recorded) = recording.read_next()? {
+        let is_text = matches!(recorded.message, RecordedMessage::Text(_));
+        // Whatever is wrong with a frame, tables are written.
+        if outcome.is_ok() || is_text {
+            outcome = outcome.and(take(recorded.message));
+        }
     }
+    let mut names = Names::default();
     for (pipeline, table) in &tables {
-        table.write(&options.out.join(format!("{}.csv", file_name(pipeline))))?;
+        table.write(&options.out.join(format!("{}.csv", names.take(pipeline))))?;
     }
+    outcome?;
     for (name, view) in &views {
         say(format!("{name}: {} of {} frames", view.written, view.seen))?;
+        if let Some(reason) = &view.plain {
+            say(format!("{name}: drawn without colours: {reason}"))?;
+        }
     }
     for (name, table) in &tables {
         say(format!("{name}: {} measurements", table.rows.len()))?;
     }
     if undecoded > 0 || recording.lost_bytes() > 0 {
         let lost = recording.lost_bytes();
-        say(format!("{undecoded} frames and the last {lost} bytes could not be read"))?;
+        say(format!("{undecoded} frames and {lost} bytes could not be read"))?;
     }
     match (&options.view, views.is_empty()) {
         (Some(name), true) if vtk || options.png => {
@@ -122,8 +164,25 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
 }
 
 impl View {
+    /// Goes on to a frame. Where another run has begun it has files and a series of its own: cycles
+    /// rise in a run.
+    fn go_on(&mut self, frame: &DecodedFrame, greetings: usize, names: &mut Names) {
+        let is_of_run = self.last.is_some_and(|(cycle, greeted)| {
+            frame.cycle > cycle || (frame.cycle == cycle && greetings == greeted)
+        });
+        if !is_of_run {
+            self.runs += 1;
+            self.name = match self.runs {
+                1 => names.take(&frame.view),
+                runs => names.take(&format!("{}-run-{runs}", frame.view)),
+            };
+            self.series = None;
+        }
+        self.last = Some((frame.cycle, greetings));
+    }
+
     fn take(&mut self, frame: DecodedFrame, options: &Options, vtk: bool) -> Result<(), Failure> {
-        let DecodedFrame { view, cells, cycle, time, points, mut fields, .. } = frame;
+        let DecodedFrame { cells, cycle, time, points, mut fields, .. } = frame;
         if let Some(cells) = cells {
             self.cells = Arc::new(cells_of(&cells)?);
         }
@@ -134,7 +193,7 @@ impl View {
         fields.retain(|field| !field.values.is_empty());
         let cells = Arc::clone(&self.cells);
         let extract = Arc::new(Extract { points, vertices: None, cells, features: None, fields });
-        let name = file_name(&view);
+        let name = &self.name;
         if vtk {
             let path = options.out.join(format!("{name}-{cycle:06}.vtp"));
             write(&path, &extract)?;
@@ -147,7 +206,14 @@ impl View {
         }
         if options.png {
             let render = Render { field: options.color_by.clone(), ..Render::default() };
-            let pictures = draw(&render, &extract, cycle, time).map_err(Failure::Wrong)?;
+            let pictures = match draw(&render, &extract, cycle, time) {
+                Err(reason) if render.field.is_some() => {
+                    self.plain.get_or_insert(reason);
+                    draw(&Render { field: None, ..render }, &extract, cycle, time)
+                }
+                drawn => drawn,
+            };
+            let pictures = pictures.map_err(Failure::Wrong)?;
             for picture in pictures {
                 let path = options.out.join(format!("{name}-{cycle:06}.png"));
                 write_picture(&path, &picture.image)?;
@@ -191,9 +257,9 @@ fn add(tables: &mut BTreeMap<String, Table>, text: &str) {
 impl Table {
     fn write(&self, path: &Path) -> std::io::Result<()> {
         let mut out = BufWriter::new(File::create(path)?);
-        let mut line = "cycle,time".to_owned();
-        self.titles.iter().for_each(|title| _ = write!(line, ",{title}"));
-        writeln!(out, "{line}")?;
+        let titles: Vec<String> = self.titles.iter().cloned().collect();
+        writeln!(out, "{}", head(&titles))?;
+        let mut line = String::new();
         for (cycle, time, values) in &self.rows {
             line.clear();
             let _ = write!(line, "{cycle},{time}");
@@ -213,4 +279,28 @@ impl Table {
 fn file_name(name: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
     name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_several_names_are_never_called_alike() {
+        let mut names = Names::default();
+        let taken = ["wall two", "wall_two", "Wall two", "wall_two-2"].map(|name| names.take(name));
+        assert_eq!(taken, ["wall_two", "wall_two-2", "Wall_two-3", "wall_two-2-2"]);
+    }
+
+    #[test]
+    fn titles_with_commas_are_one_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut tables = BTreeMap::new();
+        let text = r#"{"monitor": {"pipeline": "a", "cycle": 3, "time": 0.5, "values": {"p, Pa": 2, "q": null}}}"#;
+        add(&mut tables, text);
+        let file = folder.path().join("a.csv");
+        tables["a"].write(&file).unwrap();
+        let text = std::fs::read_to_string(file).unwrap();
+        assert_eq!(text, "cycle,time,\"p, Pa\",q\n3,0.5,2,nan\n");
+    }
 }

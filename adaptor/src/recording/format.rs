@@ -9,6 +9,8 @@ pub(crate) const MAGIC: &[u8; 12] = b"TMBLRECD\x01\0\0\0";
 pub(crate) const HEAD: usize = 41;
 /// Bytes that a message may have.
 pub(crate) const MESSAGE: u32 = 1 << 30;
+/// Bytes that are looked through at once for a head.
+const WINDOW: u64 = 1 << 16;
 
 /// What a message is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,6 +142,38 @@ pub(crate) fn read_head(file: &mut (impl Read + Seek), at: u64) -> io::Result<Op
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
         Err(error) => Err(error),
     }
+}
+
+/// The first message from a place on whose head can be read, and its place: there, or behind bytes
+/// that are damaged, which the checksums of heads tell. `None` where no message is whole.
+pub(crate) fn find_head(
+    file: &mut (impl Read + Seek),
+    from: u64,
+    length: u64,
+) -> io::Result<Option<(u64, Head)>> {
+    let is_whole = |at: u64, head: &Head| at + HEAD as u64 + u64::from(head.length) <= length;
+    if let Some(head) = read_head(file, from)? {
+        return Ok(is_whole(from, &head).then_some((from, head)));
+    }
+    let mut at = from + 1;
+    let mut bytes = Vec::with_capacity(WINDOW as usize);
+    while at + HEAD as u64 <= length {
+        file.seek(SeekFrom::Start(at))?;
+        bytes.clear();
+        (&mut *file).take(WINDOW).read_to_end(&mut bytes)?;
+        for (place, bytes) in (at..).zip(bytes.windows(HEAD)) {
+            let is_kind = bytes.get(4).is_some_and(|kind| usize::from(*kind) < Kind::ALL.len());
+            let head = bytes.try_into().ok().filter(|_| is_kind).and_then(Head::read);
+            if let Some(head) = head.filter(|head| is_whole(place, head)) {
+                return Ok(Some((place, head)));
+            }
+        }
+        if bytes.len() < HEAD {
+            break;
+        }
+        at += (bytes.len() - HEAD) as u64 + 1;
+    }
+    Ok(None)
 }
 
 /// Reads the message whose head lies at this place; `None` where it is not what was written.

@@ -24,11 +24,19 @@
 mod format;
 mod reader;
 
-pub(crate) use format::{HEAD, Head, Kind, MAGIC, read_head, write};
+pub(crate) use format::{HEAD, Head, Kind, MAGIC, find_head, write};
 pub use reader::{Moment, RecordError, Recorded, RecordedMessage, Recording};
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+    use tombolo_deform::mesh::{CellType, Cells};
+    use tombolo_pipelines::{
+        encode::Encoder,
+        extract::Extract,
+        run::{Encoding, Frame},
+    };
+
     use super::*;
 
     /// A recording of two views: a key frame of each every ten messages.
@@ -81,12 +89,81 @@ mod tests {
             assert_eq!(recording.read_next().unwrap().unwrap().moment.cycle, expected, "{seconds}");
         }
         assert_eq!(recording.seconds_of_cycle(22), 2.2);
+        // Also to where no key frame is.
+        assert_eq!(recording.seconds_of_cycle(25), 2.5);
+        assert_eq!(recording.seconds_of_time(0.1 * 37.0), 3.7);
         assert_eq!(recording.seconds_of_time(99.0), 5.9);
         assert_eq!(
             recording.orders(1.35),
             ["{\"order\":{\"id\":\"o3\"}}", "{\"order\":{\"id\":\"o13\"}}"]
         );
         assert_eq!(recording.hello(0.5).as_deref(), Some("{\"hello\":{}}"));
+    }
+
+    /// A key frame.
+    fn frame(view: &str, cycle: u64) -> Vec<u8> {
+        let cells = Cells::uniform(CellType::Triangle, vec![0, 1, 2]).unwrap();
+        let extract = Extract {
+            points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            vertices: None,
+            cells: cells.into(),
+            features: None,
+            fields: Vec::new(),
+        };
+        let (time, encoding) = (cycle as f64, Encoding::default());
+        let frame = Frame { pipeline: view.into(), cycle, time, extract: extract.into(), encoding };
+        Encoder::new().encode(&frame, false).unwrap().with_topology().to_vec()
+    }
+
+    #[test]
+    fn no_view_is_shown_from_before_its_newest_key_frame_nor_one_that_is_gone() {
+        let hello = |views: &[&str]| {
+            let views: Vec<_> = views.iter().map(|name| json!({"name": name})).collect();
+            (Kind::Hello, 0, json!({"hello": {"views": views}}).to_string().into_bytes())
+        };
+        let key = |number: u32, view: &str, cycle| (Kind::KeyFrame, number, frame(view, cycle));
+        let next = |number: u32| (Kind::NextFrame, number, b"next".to_vec());
+        let messages = [
+            hello(&["rare", "often", "gone", "replaced"]),
+            key(0, "rare", 1),
+            key(1, "often", 2),
+            key(2, "gone", 3),
+            key(3, "replaced", 4),
+            next(0),
+            next(1),
+            hello(&["rare", "often", "replaced"]),
+            key(4, "replaced", 8),
+            key(1, "often", 9),
+            next(3),
+            next(1),
+            hello(&["rare", "often", "replaced", "gone"]),
+            key(5, "gone", 13),
+        ];
+        let mut out = MAGIC.to_vec();
+        for (number, (kind, view, message)) in (0..).zip(&messages) {
+            let moment = (number, number as f64);
+            let head = Head::of(*kind, *view, moment, 1000 * number, message).unwrap();
+            write(&mut out, &head, message).unwrap();
+        }
+        let mut recording = opened(&out).unwrap();
+        let mut shown = |seconds: f64| {
+            recording.seek(seconds);
+            let mut cycles = Vec::new();
+            while recording.next_moment().is_some_and(|next| next.seconds <= seconds) {
+                let recorded = recording.read_next().unwrap().unwrap();
+                if let RecordedMessage::Frame { .. } = recorded.message {
+                    cycles.push(recorded.moment.cycle);
+                }
+            }
+            cycles
+        };
+        assert_eq!(shown(6.5), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(shown(11.5), [1, 5, 8, 9, 11]);
+        assert_eq!(shown(13.0), [1, 5, 8, 9, 11, 13]);
+        // What follows the moment is shown as it comes.
+        assert_eq!(shown(11.5), [1, 5, 8, 9, 11]);
+        let rest: Vec<u64> = all(&mut recording).iter().map(|it| it.moment.cycle).collect();
+        assert_eq!(rest, [12, 13]);
     }
 
     #[test]
@@ -120,6 +197,26 @@ mod tests {
             assert!(found.iter().all(|message| expected.contains(message)), "{at}");
             recording.seek(3.0);
             let _ = (recording.read_next(), recording.hello(3.0), recording.orders(3.0));
+        }
+    }
+
+    #[test]
+    fn what_lies_behind_a_damaged_head_is_found_again() {
+        let whole = bytes();
+        let expected = all(&mut opened(&whole).unwrap());
+        // The key frame of view 0 at cycle 11: its next frames, 15, cannot be shown without it.
+        let at = whole.windows(6).position(|bytes| bytes == b"key 11").unwrap() - HEAD;
+        for byte in at..at + HEAD {
+            let mut damaged = whole.clone();
+            damaged[byte] ^= 0x10;
+            let mut recording = opened(&damaged).unwrap();
+            assert_eq!(recording.lost_bytes(), HEAD as u64 + 6, "byte {}", byte - at);
+            assert_eq!(recording.last().cycle, 59);
+            let found: Vec<u64> = all(&mut recording).iter().map(|it| it.moment.cycle).collect();
+            let seen = expected.iter().map(|it| it.moment.cycle);
+            // Nor is it known whose frame the damaged one was.
+            let without: Vec<u64> = seen.filter(|cycle| ![11, 15].contains(cycle)).collect();
+            assert_eq!(found, without, "byte {}", byte - at);
         }
     }
 

@@ -6,10 +6,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::format::{HEAD, Head, Kind, MAGIC, read_head, read_message};
+use serde_json::Value;
+use tombolo_pipelines::encode::view_of;
 
-/// Key frames whose places are kept; in a longer recording every other is forgotten, again and again.
-const KEYS: usize = 1 << 18;
+use super::format::{HEAD, Head, Kind, MAGIC, find_head, read_head, read_message};
+
+/// Key frames whose places are kept, and steps whose moments are; in a longer recording every other
+/// is forgotten, again and again.
+const KEPT: usize = 1 << 18;
 /// The most views whose frames are shown.
 const MOST_VIEWS: usize = 64;
 /// Texts about orders whose places are kept, the newest.
@@ -68,6 +72,42 @@ struct Place {
     moment: Moment,
 }
 
+/// Places or moments of which, once there are many, one in so many is kept.
+#[derive(Debug)]
+struct Thinned<T> {
+    kept: Vec<T>,
+    every: usize,
+    seen: usize,
+}
+
+impl<T> Thinned<T> {
+    fn new() -> Self {
+        Self { kept: Vec::new(), every: 1, seen: 0 }
+    }
+
+    fn push(&mut self, next: T) {
+        if self.seen.is_multiple_of(self.every) {
+            self.kept.push(next);
+        }
+        self.seen += 1;
+        if self.kept.len() > KEPT {
+            let mut index = 0;
+            self.kept.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
+}
+
+/// The names of the views that a greeting lists; `None` where it has no list.
+fn names_of_views(hello: &str) -> Option<Vec<String>> {
+    let hello: Value = serde_json::from_str(hello).ok()?;
+    let views = hello["hello"]["views"].as_array()?;
+    Some(views.iter().filter_map(|view| view["name"].as_str()).map(str::to_owned).collect())
+}
+
 /// A message of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
@@ -93,9 +133,8 @@ pub enum RecordedMessage {
 
 /// A recording that is read: what was whole when it was opened.
 ///
-/// A last message that a killed run left half-written is passed over, and so is everything behind a
-/// message whose head is damaged; [`Recording::lost_bytes`] says how much. Memory is bounded, however
-/// long the file is.
+/// A last message that a killed run left half-written is passed over, and so is one whose head is
+/// damaged; [`Recording::lost_bytes`] says how much. Memory is bounded, however long the file is.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -103,9 +142,12 @@ pub struct Recording {
     /// Where the last whole message ends, and how long the file is.
     end: u64,
     length: u64,
+    lost: u64,
     first: Moment,
     last: Moment,
-    keys: Vec<Place>,
+    keys: Thinned<Place>,
+    /// The first moment of each step.
+    moments: Thinned<Moment>,
     hellos: Vec<Place>,
     orders: Vec<Place>,
     stacks: Vec<Place>,
@@ -113,6 +155,8 @@ pub struct Recording {
     next: u64,
     /// The views whose frames can be shown: their key frame was read since the last seek.
     shown: Vec<u32>,
+    /// From which place on key frames of views are shown since the last seek; of others all are.
+    from: Vec<(u32, u64)>,
 }
 
 impl Recording {
@@ -139,14 +183,17 @@ impl Recording {
             file,
             end: MAGIC.len() as u64,
             length,
+            lost: 0,
             first: Moment::default(),
             last: Moment::default(),
-            keys: Vec::new(),
+            keys: Thinned::new(),
+            moments: Thinned::new(),
             hellos: Vec::new(),
             orders: Vec::new(),
             stacks: Vec::new(),
             next: MAGIC.len() as u64,
             shown: Vec::new(),
+            from: Vec::new(),
         };
         recording.look_through().map_err(failed)?;
         if recording.hellos.is_empty() {
@@ -157,34 +204,20 @@ impl Recording {
 
     fn look_through(&mut self) -> io::Result<()> {
         let mut is_first = true;
-        // One in so many key frames is kept.
-        let (mut every, mut seen) = (1_usize, 0_usize);
-        while let Some(head) = read_head(&mut self.file, self.end)? {
-            let next = self.end + HEAD as u64 + u64::from(head.length);
-            if next > self.length {
-                break;
-            }
+        while let Some((at, head)) = find_head(&mut self.file, self.end, self.length)? {
+            self.lost += at - self.end;
+            self.end = at + HEAD as u64 + u64::from(head.length);
             let moment = Moment::of(&head);
-            let place = Place { at: self.end, view: head.view, moment };
+            let place = Place { at, view: head.view, moment };
             match head.kind {
                 Kind::Hello => self.hellos.push(place),
                 Kind::Order => self.orders.push(place),
                 Kind::Stack => self.stacks.push(place),
-                Kind::KeyFrame => {
-                    if seen.is_multiple_of(every) {
-                        self.keys.push(place);
-                    }
-                    seen += 1;
-                }
+                Kind::KeyFrame => self.keys.push(place),
                 _ => {}
             }
-            if self.keys.len() > KEYS {
-                let mut index = 0;
-                self.keys.retain(|_| {
-                    index += 1;
-                    index % 2 == 1
-                });
-                every *= 2;
+            if is_first || (moment.cycle, moment.time) != (self.last.cycle, self.last.time) {
+                self.moments.push(moment);
             }
             for kept in [&mut self.hellos, &mut self.orders, &mut self.stacks] {
                 if kept.len() > ORDERS {
@@ -195,8 +228,8 @@ impl Recording {
                 self.first = moment;
             }
             self.last = moment;
-            self.end = next;
         }
+        self.lost += self.length - self.end;
         Ok(())
     }
 
@@ -212,10 +245,11 @@ impl Recording {
         self.last
     }
 
-    /// Bytes at the end of the file that cannot be read.
+    /// Bytes of the file that cannot be read: those of messages whose heads are damaged, and what is
+    /// half-written at its end.
     #[must_use]
     pub fn lost_bytes(&self) -> u64 {
-        self.length - self.end
+        self.lost
     }
 
     /// The file.
@@ -232,10 +266,11 @@ impl Recording {
     pub fn read_next(&mut self) -> Result<Option<Recorded>, RecordError> {
         let path = self.path.clone();
         let failed = |source| RecordError::File { file: path.clone(), source };
-        while self.next < self.end {
-            let at = self.next;
-            let Some(head) = read_head(&mut self.file, at).map_err(failed)? else { break };
+        while let Some((at, head)) = self.next_head().map_err(failed)? {
             self.next = at + HEAD as u64 + u64::from(head.length);
+            if self.is_past(at, &head) {
+                continue;
+            }
             let recorded = self.message(at, &head).map_err(failed)?;
             if self.can_be_shown(&head, recorded.is_some())
                 && let Some(recorded) = recorded
@@ -245,6 +280,22 @@ impl Recording {
         }
         self.next = self.end;
         Ok(None)
+    }
+
+    /// The next message, and its place. Where one before it is damaged, nobody knows whose frame
+    /// that was: views are shown again from their next key frames on.
+    fn next_head(&mut self) -> io::Result<Option<(u64, Head)>> {
+        let found = find_head(&mut self.file, self.next, self.end)?;
+        if found.is_some_and(|(at, _)| at > self.next) {
+            self.shown.clear();
+        }
+        Ok(found)
+    }
+
+    /// Whether a message is a key frame of a view that is shown from a later one on.
+    fn is_past(&self, at: u64, head: &Head) -> bool {
+        head.kind == Kind::KeyFrame
+            && self.from.iter().any(|&(view, from)| view == head.view && at < from)
     }
 
     /// Whether a message can be shown: of frames those whose key frame was read since the last seek,
@@ -265,12 +316,12 @@ impl Recording {
 
     /// When the next message came that can be shown; `None` at the end.
     pub fn next_moment(&mut self) -> Option<Moment> {
-        while self.next < self.end {
-            let head = read_head(&mut self.file, self.next).ok()??;
-            if head.kind != Kind::NextFrame || self.shown.contains(&head.view) {
+        while let Some((at, head)) = self.next_head().ok()? {
+            let is_shown = head.kind != Kind::NextFrame || self.shown.contains(&head.view);
+            if is_shown && !self.is_past(at, &head) {
                 return Some(Moment::of(&head));
             }
-            self.next += HEAD as u64 + u64::from(head.length);
+            self.next = at + HEAD as u64 + u64::from(head.length);
         }
         None
     }
@@ -296,13 +347,13 @@ impl Recording {
         }
     }
 
-    /// Goes to a moment: the next message will be the key frame from which the first view to come can
-    /// be shown, where all views that have one before then can. Texts before the moment are to be
-    /// passed over.
+    /// Goes to a moment: the next messages will be the newest key frame before then of each view that
+    /// the greeting of that moment lists, and what came behind it; of no view comes anything older.
+    /// Texts before the moment are to be passed over.
     pub fn seek(&mut self, seconds: f64) {
-        let upto = self.keys.partition_point(|key| key.moment.seconds <= seconds);
+        let upto = self.keys.kept.partition_point(|key| key.moment.seconds <= seconds);
         let mut newest: Vec<Place> = Vec::new();
-        for key in self.keys[..upto].iter().rev() {
+        for key in self.keys.kept[..upto].iter().rev() {
             if newest.iter().all(|known| known.view != key.view) {
                 newest.push(*key);
             }
@@ -311,11 +362,40 @@ impl Recording {
                 break;
             }
         }
+        let mut listed = self.hello(seconds).and_then(|hello| names_of_views(&hello));
         self.shown.clear();
-        self.next = newest.iter().map(|key| key.at).min().unwrap_or(MAGIC.len() as u64);
+        self.from.clear();
+        let mut first = None;
+        // The newest first: a view that was replaced has the name of the one that came after it.
+        for key in newest {
+            let is_listed = match (&mut listed, self.view_at(key)) {
+                (Some(listed), Some(name)) => {
+                    let place = listed.iter().position(|known| *known == name);
+                    place.map(|place| listed.swap_remove(place)).is_some()
+                }
+                // What cannot be told is shown.
+                _ => true,
+            };
+            if is_listed {
+                first = Some(key.at);
+            }
+            self.from.push((key.view, if is_listed { key.at } else { key.at + 1 }));
+        }
+        let oldest = self.from.iter().map(|(_, from)| *from).min();
+        self.next = first.or(oldest).unwrap_or(MAGIC.len() as u64);
     }
 
-    /// The moment of a cycle: that of the first key frame or greeting of it or a later one.
+    /// The name of the view that a frame is of.
+    fn view_at(&mut self, place: Place) -> Option<String> {
+        let head = read_head(&mut self.file, place.at).ok()??;
+        match self.message(place.at, &head).ok()??.message {
+            RecordedMessage::Frame { bytes, .. } => view_of(&bytes).ok(),
+            RecordedMessage::Text(_) => None,
+        }
+    }
+
+    /// The moment of a cycle: that of the first message of it or a later one. In a recording of more
+    /// than 2^18 steps it may be that of a step soon after it.
     #[must_use]
     pub fn seconds_of_cycle(&self, cycle: u64) -> f64 {
         self.seconds_where(|moment| moment.cycle >= cycle)
@@ -328,8 +408,8 @@ impl Recording {
     }
 
     fn seconds_where(&self, has_come: impl Fn(&Moment) -> bool) -> f64 {
-        let found = self.keys.iter().find(|key| has_come(&key.moment));
-        found.map_or(self.last.seconds, |key| key.moment.seconds)
+        let found = self.moments.kept.iter().find(|moment| has_come(moment));
+        found.map_or(self.last.seconds, |moment| moment.seconds)
     }
 
     /// The newest greeting up to a moment.

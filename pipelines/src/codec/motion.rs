@@ -82,26 +82,18 @@ impl Motion {
         if wanted.iter().any(|x| !x.is_finite()) {
             return Err(CodecError::Positions);
         }
-        let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= bound);
-        if near(&self.now, &wanted) {
+        if near(&self.now, &wanted, bound) {
             message.push(STILL);
             self.is_free = false;
-        } else if let Some((number, along)) = self.along(&wanted).filter(|of| near(&of.1, &wanted))
+        } else if let Some((number, along)) =
+            self.along(&wanted).filter(|of| near(&of.1, &wanted, bound))
         {
             message.push(ALONG);
             message.extend(number.to_le_bytes());
             self.now = along;
             self.is_free = false;
         } else if self.is_free || self.begin(topology, &wanted, bound, message)?.is_none() {
-            message.push(FREE);
-            let away = difference(&wanted, &self.reference);
-            let identity = identity(expected);
-            let (start, hierarchy) = (message.len(), topology.points());
-            let [write, read] = &mut self.free;
-            write.encode(hierarchy, &identity, &away, Bound::Absolute(bound), message)?;
-            let away = read.decode(hierarchy, &mut &message[start..])?;
-            self.now = sum(&self.reference, &away);
-            self.is_free = true;
+            self.free(topology, &wanted, bound, message)?;
         }
         self.last = Some(wanted);
         Ok(())
@@ -130,12 +122,54 @@ impl Motion {
         Field::new(3).encode(hierarchy, &identity, &by, Bound::Absolute(bound / FINER), message)?;
         let by = Field::new(3).decode(hierarchy, &mut &message[at..])?;
         let now = sum(&from, &by);
-        if now.iter().zip(wanted).any(|(a, b)| (a - b).abs() > bound) {
+        if !near(&now, wanted, bound) {
             message.truncate(start);
             return Ok(None);
         }
         (self.from, self.by, self.now, self.is_free) = (from, Some(by), now, true);
         Ok(Some(()))
+    }
+
+    /// Codes the displacement from the reference, finer than the bound by what is lost to rounding
+    /// when it is taken and added again. Where that is all of the bound, it is coded exactly; where
+    /// even this is not near enough, the positions themselves are, as a displacement from zero.
+    fn free(
+        &mut self,
+        topology: &Topology,
+        wanted: &[f64],
+        bound: f64,
+        message: &mut Vec<u8>,
+    ) -> Result<(), CodecError> {
+        let identity = identity(wanted.len() / 3);
+        let hierarchy = topology.points();
+        let away = difference(wanted, &self.reference);
+        let largest = away.iter().chain(wanted).fold(0.0_f64, |most, x| most.max(x.abs()));
+        let rounding = 2.0 * f64::EPSILON * (largest + bound);
+        let coded = if bound - rounding > rounding {
+            Some(Bound::Absolute(bound - rounding))
+        } else {
+            near(&sum(&self.reference, &away), wanted, bound).then_some(Bound::Exact)
+        };
+        self.is_free = true;
+        if let Some(coded) = coded {
+            message.push(FREE);
+            let start = message.len();
+            let [write, read] = &mut self.free;
+            write.encode(hierarchy, &identity, &away, coded, message)?;
+            let away = read.decode(hierarchy, &mut &message[start..])?;
+            self.now = sum(&self.reference, &away);
+            return Ok(());
+        }
+        message.push(NEW);
+        let back: Vec<f64> = self.now.iter().map(|x| -x).collect();
+        Field::new(3).encode(hierarchy, &identity, &back, Bound::Exact, message)?;
+        let at = message.len();
+        Field::new(3).encode(hierarchy, &identity, wanted, Bound::Absolute(bound), message)?;
+        let by = Field::new(3).decode(hierarchy, &mut &message[at..])?;
+        self.from = sum(&self.now, &back);
+        self.now = sum(&self.from, &by);
+        self.by = Some(by);
+        Ok(())
     }
 
     /// The number of displacements that comes nearest, and where it leads.
@@ -197,6 +231,11 @@ fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+/// Whether no number is off by more than the bound.
+fn near(a: &[f64], b: &[f64], bound: f64) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= bound)
 }
 
 fn at(from: &[f64], by: &[f64], number: f64) -> Vec<f64> {

@@ -134,6 +134,24 @@ impl Decoder {
     }
 }
 
+/// The view that a frame is of, without reading the frame.
+///
+/// # Errors
+/// [`DecodeError`] where the message is no frame.
+pub fn view_of(message: &[u8]) -> Result<String, DecodeError> {
+    let (kind, mut input) = open(message)?;
+    match kind {
+        Kind::Frame => {}
+        Kind::FrameWithTopology => {
+            input.block().map_err(|failure| error("topology", failure.to_string()))?;
+        }
+        Kind::Surface => {
+            return Err(error("preamble", "the message holds a surface, expected a frame"));
+        }
+    }
+    name(&mut input, "header")
+}
+
 struct Header {
     view: String,
     topology: u64,

@@ -37,7 +37,7 @@ mod error;
 mod layout;
 mod surface;
 
-pub use decoder::{DecodedCells, DecodedFrame, Decoder};
+pub use decoder::{DecodedCells, DecodedFrame, Decoder, view_of};
 pub use encoder::{Encoded, Encoder};
 pub use error::{DecodeError, EncodeError};
 pub use surface::{decode_surface, encode_surface};

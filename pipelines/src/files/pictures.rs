@@ -1,6 +1,7 @@
 //! Pictures as PNG files, and Cinema databases of them.
 
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader, BufWriter, ErrorKind, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use super::error::{FileError, Flaw};
@@ -32,6 +33,8 @@ fn encode(image: &Image) -> std::io::Result<Vec<u8>> {
 
 const TABLE: &str = "data.csv";
 const HEAD: &str = "time,cycle,camera,azimuth,elevation,FILE\n";
+/// Bytes of a table that are read back.
+const MOST: u64 = 1 << 30;
 
 /// A Cinema database (specification D): a folder that ends in `.cdb` with pictures and the table
 /// `data.csv`, which says what each of them shows.
@@ -62,6 +65,36 @@ impl Database {
     pub fn create(folder: &Path) -> Result<Self, FileError> {
         write_whole(&folder.join(TABLE), |file| file.write_all(HEAD.as_bytes()))?;
         Ok(Self { folder: folder.to_path_buf(), length: HEAD.len() as u64 })
+    }
+
+    /// Goes on with the database that is there, or creates it. Pictures of later cycles than this
+    /// leave the table.
+    ///
+    /// # Errors
+    /// [`FileError`] where the table cannot be read or written.
+    pub fn resume(folder: &Path, cycle: u64) -> Result<Self, FileError> {
+        let table = folder.join(TABLE);
+        let old = match File::open(&table) {
+            Ok(old) => old,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Self::create(folder),
+            Err(error) => return Err(Flaw::from(error).in_file(&table)),
+        };
+        let mut lines = BufReader::new(old.take(MOST)).lines().map_while(Result::ok);
+        if lines.next().is_none_or(|line| line != HEAD.trim_end()) {
+            return Self::create(folder);
+        }
+        let of_row = |row: &String| row.split(',').nth(1)?.parse().ok();
+        let mut length = HEAD.len() as u64;
+        write_whole(&table, |file| {
+            let mut out = BufWriter::new(file);
+            out.write_all(HEAD.as_bytes())?;
+            for row in lines.filter(|row| of_row(row).is_some_and(|of: u64| of <= cycle)) {
+                writeln!(out, "{row}")?;
+                length += row.len() as u64 + 1;
+            }
+            out.flush()
+        })?;
+        Ok(Self { folder: folder.to_path_buf(), length })
     }
 
     /// Writes a picture and adds its row to the table. Of a camera that stands at a point the

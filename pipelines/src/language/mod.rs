@@ -74,7 +74,7 @@ pub use extracts::{
     Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
 };
 pub use file_pattern::file_pattern;
-pub(crate) use file_pattern::picture_pattern;
+pub(crate) use file_pattern::{picture_pattern, series_of};
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
     CheckpointNote, HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RestartedFrom,

@@ -7,7 +7,7 @@ use super::derived::{Formula, PARAMETER};
 use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
-use super::{Csv, Log, Parameter, Problem, Problems, nearest};
+use super::{Csv, Log, Parameter, Problem, Problems, Render, nearest};
 use crate::expression::{Expression, UsedName};
 
 /// A number that a pipeline measures.
@@ -289,6 +289,7 @@ pub(crate) fn line(log: &Log, scope: &Scope) -> Result<Line, Problem> {
 /// Checks of all pipelines what they say of each other's monitors.
 pub(super) fn check(config: &Config, found: &mut Found) {
     let mut files = Vec::new();
+    let mut databases = HashSet::new();
     let faulty = found.parts();
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
@@ -307,6 +308,16 @@ pub(super) fn check(config: &Config, found: &mut Found) {
                 found.push(located(Problem::new(message)));
             }
             files.push((&table.file, index));
+        }
+        for render in pictures(pipeline).filter(|render| render.is_database()) {
+            if !databases.insert(&render.file) {
+                let message = format!(
+                    "two `render` write the database `{}`, where their pictures would be called \
+                     alike; expected one for each",
+                    render.file
+                );
+                found.push(located(Problem::new(message)));
+            }
         }
     }
 }
@@ -411,6 +422,17 @@ fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
     });
     of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
         Action::Csv(csv) => Some(csv),
+        _ => None,
+    }))
+}
+
+fn pictures(pipeline: &Pipeline) -> impl Iterator<Item = &Render> {
+    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
+        Stage::Render(render) => Some(&**render),
+        _ => None,
+    });
+    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
+        Action::Render(render) => Some(&**render),
         _ => None,
     }))
 }

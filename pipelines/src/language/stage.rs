@@ -327,10 +327,11 @@ pub struct Write {
     /// The file, ending in `.vtu`, `.vtp` or `.vtk`, or in `.vtpd`, `.pvtu` or `.pvtp`, which name a
     /// file in a folder beside them that holds the data. `{cycle}` and `{time}` stand for those of the
     /// step; `{cycle:4}` has four digits or more instead of six, `{time:3}` three behind the point.
-    /// A relative one lies in the run's output directory.
+    /// A relative one lies in the run's output directory. A `.pvd` file, called as the pipeline, names
+    /// the files with their times, in the folder that all of them lie in or below; that of a second
+    /// `write` of a pipeline has `-2` behind its name.
     pub file: String,
-    /// How many files of the pipeline stay: older ones are deleted, and leave its `.pvd` series. Left
-    /// out, all.
+    /// How many of these files stay: older ones are deleted, and leave their `.pvd`. Left out, all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keep: Option<NonZeroU32>,
 }

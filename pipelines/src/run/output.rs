@@ -91,7 +91,10 @@ pub enum Output {
         time: f64,
         /// The extract to write.
         extract: Arc<Extract>,
-        /// How many files of the pipeline stay; `None`: all.
+        /// The .pvd series that the file belongs to; `None` where each step writes the same file. A
+        /// relative one lies in the run's output directory.
+        series: Option<String>,
+        /// How many files of the series stay; `None`: all.
         keep: Option<NonZeroU32>,
     },
     /// Add a row to a table. On rank 0.

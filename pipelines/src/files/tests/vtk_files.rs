@@ -1,6 +1,6 @@
 //! What is written is read back alike, by this crate and by VTK.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::*;
@@ -186,6 +186,105 @@ fn a_series_is_whole_after_every_entry() {
         assert!(text.ends_with("</Collection>\n</VTKFile>\n"));
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_series_names_files_from_where_it_lies() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a/b/run.pvd");
+    let files = ["a/b/0/wall.vtu", "a/1.vtu", "c/2.vtu"].map(|file| folder.path().join(file));
+    let mut series = Series::create(&path).unwrap();
+    files.iter().for_each(|file| series.push(0.5, file).unwrap());
+    // Once more, at another time.
+    series.push(0.75, &files[2]).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    for file in ["0/wall.vtu", "../1.vtu", "../../c/2.vtu"] {
+        assert_eq!(text.matches(&format!("file=\"{file}\"")).count(), 1, "{text}");
+    }
+    let found: Vec<(f64, PathBuf)> = Series::entries(&path).unwrap().collect();
+    let of = |file: &str| folder.path().join("a/b").join(file);
+    let expected = [(0.5, of("0/wall.vtu")), (0.5, of("../1.vtu")), (0.75, of("../../c/2.vtu"))];
+    assert_eq!(found, expected);
+    // What is read back is written as it was.
+    Series::of(&path, found.into_iter()).unwrap();
+    assert_eq!(Series::entries(&path).unwrap().collect::<Vec<_>>(), expected);
+    assert_eq!(Series::entries(&folder.path().join("none.pvd")).unwrap().count(), 0);
+}
+
+/// The values of a field of a file.
+fn values(name: &str, bytes: &[u8], field: &str) -> (NumberType, Vec<f64>) {
+    let file = parse_mesh(Path::new(name), bytes).unwrap_or_else(|error| panic!("{error}"));
+    let found = file.fields.iter().find(|known| known.name == field).expect(field);
+    (found.number, found.values.clone())
+}
+
+#[test]
+fn bits_and_large_numbers_are_read_as_vtk_reads_them() {
+    let large = (1_u64 << 63) + 5;
+    let expected = (NumberType::U64, vec![1.0, large as f64, 0.0, 7.0]);
+    let on = (NumberType::U8, vec![1.0, 0.0, 1.0, 1.0]);
+    for (form, bits, cell) in [("ascii", "1 0 1 1", "1"), ("binary", "AQAAALA=", "AQAAAIA=")] {
+        let text = format!(
+            r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>
+            <Piece NumberOfPoints="4" NumberOfCells="1"><PointData>
+            <DataArray type="Bit" Name="on" format="{form}">{bits}</DataArray>
+            <DataArray type="UInt64" Name="large" format="ascii">1 {large} 0 7</DataArray></PointData>
+            <CellData><DataArray type="Bit" Name="cell" format="{form}">{cell}</DataArray></CellData>
+            <Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1</DataArray></Points>
+            <Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2 3</DataArray>
+            <DataArray type="Int64" Name="offsets" format="ascii">4</DataArray>
+            <DataArray type="UInt8" Name="types" format="ascii">10</DataArray></Cells>
+            </Piece></UnstructuredGrid></VTKFile>"#
+        );
+        assert_eq!(values("a.vtu", text.as_bytes(), "on"), on, "{form}");
+        assert_eq!(values("a.vtu", text.as_bytes(), "large"), expected, "{form}");
+        assert_eq!(values("a.vtu", text.as_bytes(), "cell"), (NumberType::U8, vec![1.0]), "{form}");
+    }
+    let points = [0_u8, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1].map(f32::from);
+    let legacy = |is_binary: bool| {
+        let word = if is_binary { "BINARY" } else { "ASCII" };
+        let mut file = format!(
+            "# vtk DataFile Version 3.0\n\n{word}\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n"
+        );
+        let mut bytes = Vec::new();
+        let mut put = |binary: &[u8], text: String, next: &str| {
+            bytes.extend(std::mem::take(&mut file).into_bytes());
+            bytes.extend(if is_binary { binary.to_vec() } else { text.into_bytes() });
+            bytes.extend(format!("\n{next}\n").into_bytes());
+        };
+        put(
+            &points.map(f32::to_be_bytes).concat(),
+            points.map(|x| x.to_string()).join(" "),
+            "CELLS 1 5",
+        );
+        put(
+            &[4_i32, 0, 1, 2, 3].map(i32::to_be_bytes).concat(),
+            "4 0 1 2 3".into(),
+            "CELL_TYPES 1",
+        );
+        put(
+            &10_i32.to_be_bytes(),
+            "10".into(),
+            "POINT_DATA 4\nSCALARS on bit\nLOOKUP_TABLE default",
+        );
+        put(
+            &[0b1011_0000],
+            "1 0 1 1".into(),
+            "SCALARS large unsigned_long 1\nLOOKUP_TABLE default",
+        );
+        let numbers = [1, large, 0, 7];
+        let text = numbers.map(|it| it.to_string()).join(" ");
+        put(&numbers.map(u64::to_be_bytes).concat(), text, "COLOR_SCALARS colour 1");
+        put(&[77, 0, 255, 128], "0.301961 0 1 0.5".into(), "");
+        bytes
+    };
+    for is_binary in [false, true] {
+        let bytes = legacy(is_binary);
+        assert_eq!(values("a.vtk", &bytes, "on"), on, "binary: {is_binary}");
+        assert_eq!(values("a.vtk", &bytes, "large"), expected, "binary: {is_binary}");
+        let colour = (NumberType::U8, vec![77.0, 0.0, 255.0, 128.0]);
+        assert_eq!(values("a.vtk", &bytes, "colour"), colour, "binary: {is_binary}");
+    }
 }
 
 /// Runs `tests/vtk/read_back.py` with Debian's VTK; `None` where the environment says that there is

@@ -23,14 +23,60 @@ pub(super) fn number_name(number: NumberType) -> &'static str {
     }
 }
 
-/// The type of number that XML files call so.
-pub(super) fn from_xml(name: &str) -> Option<NumberType> {
-    NumberType::ALL.into_iter().find(|number| number_name(*number) == name)
+/// How the values of an array are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stored {
+    Number(NumberType),
+    /// Eight to a byte, the highest bit first.
+    Bit,
 }
 
-/// The type of number that legacy files call so.
-pub(super) fn from_legacy(name: &str) -> Option<NumberType> {
-    Some(match name.to_ascii_lowercase().as_str() {
+impl Stored {
+    /// The type of number that the values have for us.
+    pub fn number(self) -> NumberType {
+        match self {
+            Stored::Number(number) => number,
+            Stored::Bit => NumberType::U8,
+        }
+    }
+
+    /// The bytes of so many values.
+    pub fn bytes(self, count: u64) -> u64 {
+        match self {
+            Stored::Number(number) => count.saturating_mul(number.bytes() as u64),
+            Stored::Bit => count.div_ceil(8),
+        }
+    }
+
+    /// The first `count` values from their bytes, or all, where they are bits; of numbers always all.
+    /// Bytes beyond the last whole number are not looked at.
+    pub fn decode(self, bytes: &[u8], big_endian: bool, count: Option<u64>) -> Numbers {
+        let number = match self {
+            Stored::Number(number) => number,
+            Stored::Bit => {
+                let count =
+                    count.map_or(usize::MAX, |it| usize::try_from(it).unwrap_or(usize::MAX));
+                let bits = bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte << bit >> 7));
+                return Numbers::Integer(bits.take(count).map(i64::from).collect());
+            }
+        };
+        decode(number, bytes, big_endian)
+    }
+}
+
+/// How the values are stored of arrays that XML files call so.
+pub(super) fn from_xml(name: &str) -> Option<Stored> {
+    if name == "Bit" {
+        return Some(Stored::Bit);
+    }
+    let mut all = NumberType::ALL.into_iter();
+    all.find(|number| number_name(*number) == name).map(Stored::Number)
+}
+
+/// How the values are stored of arrays that legacy files call so.
+pub(super) fn from_legacy(name: &str) -> Option<Stored> {
+    Some(Stored::Number(match name.to_ascii_lowercase().as_str() {
+        "bit" => return Some(Stored::Bit),
         "char" | "signed_char" => NumberType::I8,
         "unsigned_char" => NumberType::U8,
         "short" => NumberType::I16,
@@ -43,11 +89,10 @@ pub(super) fn from_legacy(name: &str) -> Option<NumberType> {
         "float" => NumberType::F32,
         "double" => NumberType::F64,
         _ => return None,
-    })
+    }))
 }
 
-/// Numbers from their bytes; bytes beyond the last whole number are not looked at.
-pub(super) fn decode(kind: NumberType, bytes: &[u8], big_endian: bool) -> Result<Numbers, Problem> {
+fn decode(kind: NumberType, bytes: &[u8], big_endian: bool) -> Numbers {
     fn all<const N: usize, T>(
         bytes: &[u8],
         big_endian: bool,
@@ -61,7 +106,7 @@ pub(super) fn decode(kind: NumberType, bytes: &[u8], big_endian: bool) -> Result
         };
         bytes.as_chunks().0.iter().copied().map(in_order).collect()
     }
-    Ok(match kind {
+    match kind {
         NumberType::I8 => {
             Numbers::Integer(all(bytes, big_endian, |word| i8::from_le_bytes(word).into()))
         }
@@ -81,20 +126,23 @@ pub(super) fn decode(kind: NumberType, bytes: &[u8], big_endian: bool) -> Result
         NumberType::U32 => {
             Numbers::Integer(all(bytes, big_endian, |word| u32::from_le_bytes(word).into()))
         }
-        NumberType::U64 => {
-            let number = |word: u64| {
-                let expected = || format!("a number up to {}", i64::MAX);
-                i64::try_from(word)
-                    .map_err(|_| Problem::unexpected(word.to_string().as_bytes(), expected()))
-            };
-            let words = all(bytes, big_endian, u64::from_le_bytes);
-            Numbers::Integer(words.into_iter().map(number).collect::<Result<_, _>>()?)
-        }
+        NumberType::U64 => wide(all(bytes, big_endian, |word| u64::from_le_bytes(word).into())),
         NumberType::F32 => {
             Numbers::Float(all(bytes, big_endian, |word| f32::from_le_bytes(word).into()))
         }
         NumberType::F64 => Numbers::Float(all(bytes, big_endian, f64::from_le_bytes)),
-    })
+    }
+}
+
+/// Numbers that may be beyond those of 64 bits with a sign: then as doubles, which a field holds.
+fn wide(values: Vec<i128>) -> Numbers {
+    let narrow = values.iter().map(|value| i64::try_from(*value).ok());
+    #[expect(
+        clippy::cast_precision_loss,
+        reason = "fields of large integers are shown, not computed with"
+    )]
+    let as_doubles = || Numbers::Float(values.iter().map(|value| *value as f64).collect());
+    narrow.collect::<Option<_>>().map_or_else(as_doubles, Numbers::Integer)
 }
 
 /// Numbers from text: all words of it, or the first `count`.
@@ -116,6 +164,9 @@ pub(super) fn read_text(
     }
     if kind.is_real() {
         return Ok(Numbers::Float(all(scanner, count, "a number")?));
+    }
+    if kind == NumberType::U64 {
+        return Ok(wide(all(scanner, count, "an integer")?));
     }
     Ok(Numbers::Integer(all(scanner, count, "an integer")?))
 }

@@ -6,7 +6,7 @@ use tombolo_deform::mesh::NumberType;
 use super::super::MeshFile;
 use super::super::error::{Flaw, Problem};
 use super::super::scanner::Scanner;
-use super::array::{Array, Numbers, decode, from_legacy, read_text};
+use super::array::{Array, Numbers, Stored, from_legacy, read_text};
 use super::dataset::{Dataset, points, push_cell, push_polyhedron, row};
 use super::kind::Kind;
 use super::names::decoded;
@@ -36,6 +36,9 @@ pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
     legacy.cells()?;
     legacy.dataset.into_mesh_file()
 }
+
+/// The numbers of cells in files before version 5.
+const INT: Stored = Stored::Number(NumberType::I32);
 
 /// The owner of attributes.
 #[derive(Clone, Copy)]
@@ -73,8 +76,8 @@ impl Legacy<'_> {
                     let kind = self.scalar()?;
                     let numbers =
                         self.numbers(kind, count.saturating_mul(3), "point coordinates")?;
-                    let array =
-                        Array { name: "points".into(), components: 3, number: kind, numbers };
+                    let (name, number) = ("points".into(), kind.number());
+                    let array = Array { name, components: 3, number, numbers };
                     self.dataset.points =
                         points(array).map_err(|problem| self.scanner.flaw(problem))?;
                 }
@@ -85,7 +88,7 @@ impl Legacy<'_> {
                 b"TRIANGLE_STRIPS" => self.rows(Some(Kind::Strips))?,
                 b"CELL_TYPES" => {
                     let count: u64 = self.scanner.number("the number of cell types")?;
-                    self.types = self.integers(NumberType::I32, count, "cell types")?;
+                    self.types = self.integers(INT, count, "cell types")?;
                 }
                 b"POINT_DATA" => {
                     self.scanner.number::<u64>("the number of points")?;
@@ -126,7 +129,7 @@ impl Legacy<'_> {
         while !self.scanner.rest().is_empty() && !self.scanner.line().trim_ascii().is_empty() {}
     }
 
-    fn scalar(&mut self) -> Result<NumberType, Flaw> {
+    fn scalar(&mut self) -> Result<Stored, Flaw> {
         let start = self.scanner.position();
         let name = self.scanner.text("a number type")?;
         from_legacy(name).ok_or_else(|| {
@@ -136,18 +139,20 @@ impl Legacy<'_> {
     }
 
     /// So many numbers from the next line on.
-    fn numbers(&mut self, kind: NumberType, count: u64, what: &str) -> Result<Numbers, Flaw> {
+    fn numbers(&mut self, kind: Stored, count: u64, what: &str) -> Result<Numbers, Flaw> {
         if self.scanner.binary {
             self.scanner.line();
-            self.scanner.check_count(count, kind.bytes(), what)?;
-            let bytes = self.scanner.take(count.saturating_mul(kind.bytes() as u64), what)?;
-            return decode(kind, bytes, true).map_err(|problem| self.scanner.flaw(problem));
+            if let Stored::Number(number) = kind {
+                self.scanner.check_count(count, number.bytes(), what)?;
+            }
+            let bytes = self.scanner.take(kind.bytes(count), what)?;
+            return Ok(kind.decode(bytes, true, Some(count)));
         }
         let count = self.scanner.check_count(count, 2, what)?;
-        read_text(kind, &mut self.scanner, Some(count))
+        read_text(kind.number(), &mut self.scanner, Some(count))
     }
 
-    fn integers(&mut self, kind: NumberType, count: u64, what: &str) -> Result<Vec<i64>, Flaw> {
+    fn integers(&mut self, kind: Stored, count: u64, what: &str) -> Result<Vec<i64>, Flaw> {
         match self.numbers(kind, count, what)? {
             Numbers::Integer(values) => Ok(values),
             _ => Err(self
@@ -190,7 +195,7 @@ impl Legacy<'_> {
             }
             return Ok(());
         }
-        let numbers = self.integers(NumberType::I32, size, "cells")?;
+        let numbers = self.integers(INT, size, "cells")?;
         let mut start = 0;
         for cell in 0..first {
             let cell = usize::try_from(cell).unwrap_or(usize::MAX);
@@ -266,14 +271,18 @@ impl Legacy<'_> {
             }
             _ => return Ok(false),
         };
-        let numbers = self.numbers(kind, tuples.saturating_mul(components), &name)?;
+        let mut numbers = self.numbers(kind, tuples.saturating_mul(components), &name)?;
+        let mut number = kind.number();
+        if word == b"COLOR_SCALARS" && !self.scanner.binary {
+            (number, numbers) = (NumberType::U8, bytes_of_colours(numbers));
+        }
         let components = usize::try_from(components).unwrap_or(usize::MAX);
-        self.push(owner, Array { name, components, number: kind, numbers });
+        self.push(owner, Array { name, components, number, numbers });
         Ok(true)
     }
 
-    fn colour(&self) -> NumberType {
-        if self.scanner.binary { NumberType::U8 } else { NumberType::F64 }
+    fn colour(&self) -> Stored {
+        Stored::Number(if self.scanner.binary { NumberType::U8 } else { NumberType::F64 })
     }
 
     /// A list of arrays.
@@ -299,7 +308,7 @@ impl Legacy<'_> {
                 (NumberType::default(), Numbers::Text(self.strings(values)?))
             } else {
                 let kind = self.scalar()?;
-                (kind, self.numbers(kind, values, &name)?)
+                (kind.number(), self.numbers(kind, values, &name)?)
             };
             let components = usize::try_from(components).unwrap_or(usize::MAX);
             self.push(owner, Array { name, components, number, numbers });
@@ -333,4 +342,16 @@ impl Legacy<'_> {
             Owner::Cells(_) => self.dataset.cell_arrays.push(array),
         }
     }
+}
+
+/// Colours from 0 to 1 as the bytes that VTK makes of them.
+fn bytes_of_colours(numbers: Numbers) -> Numbers {
+    let Numbers::Float(parts) = numbers else { return numbers };
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "whatever is out of range is the nearest byte"
+    )]
+    let byte = |part: f64| (255.0 * part + 0.5) as u8;
+    Numbers::Integer(parts.into_iter().map(|part| byte(part).into()).collect())
 }

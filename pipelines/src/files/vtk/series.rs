@@ -1,13 +1,16 @@
 //! Collections of files over time (.pvd), as ParaView opens them.
 
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::{BufRead as _, BufReader, BufWriter, Read as _, Write as _};
+use std::path::{Component, Path, PathBuf, absolute};
 
-use super::super::error::FileError;
+use super::super::error::{FileError, Flaw};
 use super::super::whole::{write_longer, write_whole};
 
 const HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n<Collection>\n";
 const TAIL: &str = "</Collection>\n</VTKFile>\n";
+/// Bytes of a series that are read back.
+const MOST: u64 = 1 << 30;
 
 /// A .pvd file that grows by one entry at a time.
 ///
@@ -27,6 +30,8 @@ pub struct Series {
     path: PathBuf,
     /// Bytes of the file up to its closing tags.
     length: u64,
+    /// The file of the last entry, and the bytes before that entry.
+    last: Option<(PathBuf, u64)>,
 }
 
 impl Series {
@@ -35,29 +40,48 @@ impl Series {
     /// # Errors
     /// [`FileError`] where the file cannot be written.
     pub fn create(path: &Path) -> Result<Self, FileError> {
-        write_whole(path, |file| {
-            file.write_all(HEAD.as_bytes())?;
-            file.write_all(TAIL.as_bytes())
-        })?;
-        Ok(Self { path: path.to_path_buf(), length: HEAD.len() as u64 })
+        Self::of(path, std::iter::empty::<(f64, &Path)>())
     }
 
     /// A series of these files, with their times, in place of what was there.
     ///
     /// # Errors
     /// As [`create`](Self::create).
-    pub fn of<'a>(
+    pub fn of<Name: AsRef<Path>>(
         path: &Path,
-        files: impl Iterator<Item = (f64, &'a Path)>,
+        files: impl Iterator<Item = (f64, Name)>,
     ) -> Result<Self, FileError> {
         let directory = path.parent().unwrap_or(Path::new(""));
-        let mut text = HEAD.to_owned();
-        files.for_each(|(time, file)| text.push_str(&entry(directory, time, file)));
+        let mut series = Self { path: path.to_path_buf(), length: HEAD.len() as u64, last: None };
         write_whole(path, |new| {
-            new.write_all(text.as_bytes())?;
-            new.write_all(TAIL.as_bytes())
+            let mut out = BufWriter::new(new);
+            out.write_all(HEAD.as_bytes())?;
+            for (time, file) in files {
+                let entry = entry(directory, time, file.as_ref());
+                out.write_all(entry.as_bytes())?;
+                series.last = Some((file.as_ref().to_path_buf(), series.length));
+                series.length += entry.len() as u64;
+            }
+            out.write_all(TAIL.as_bytes())?;
+            out.flush()
         })?;
-        Ok(Self { path: path.to_path_buf(), length: text.len() as u64 })
+        Ok(series)
+    }
+
+    /// The files that a series on disk names, with their times, in its order; none where it is not
+    /// there. Lines are passed over that are not as they are written here.
+    ///
+    /// # Errors
+    /// [`FileError`] where a file is there and cannot be opened.
+    pub fn entries(path: &Path) -> Result<impl Iterator<Item = (f64, PathBuf)> + use<>, FileError> {
+        let file = match File::open(path) {
+            Ok(file) => Some(file),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+            Err(error) => return Err(Flaw::from(error).in_file(path)),
+        };
+        let directory = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let lines = file.into_iter().flat_map(|file| BufReader::new(file.take(MOST)).lines());
+        Ok(lines.map_while(Result::ok).filter_map(move |line| parse(&directory, &line)))
     }
 
     /// The path of the series.
@@ -66,23 +90,58 @@ impl Series {
         &self.path
     }
 
-    /// Adds a file that shows the state at this time. The entry is relative to the series where the
-    /// file lies beside or below it.
+    /// Adds a file that shows the state at this time, in place of the last entry where that names
+    /// the same file. The entry is relative to the series, so that they can be moved together.
     ///
     /// # Errors
     /// [`FileError`] where the series cannot be read back or written.
     pub fn push(&mut self, time: f64, file: &Path) -> Result<(), FileError> {
         let directory = self.path.parent().unwrap_or(Path::new(""));
         let entry = entry(directory, time, file);
-        write_longer(&self.path, self.length, &entry, TAIL)?;
-        self.length += entry.len() as u64;
+        let before = match &self.last {
+            Some((last, before)) if last == file => *before,
+            _ => self.length,
+        };
+        write_longer(&self.path, before, &entry, TAIL)?;
+        self.last = Some((file.to_path_buf(), before));
+        self.length = before + entry.len() as u64;
         Ok(())
     }
 }
 
 /// The line of a file.
 fn entry(directory: &Path, time: f64, file: &Path) -> String {
-    let shown = file.strip_prefix(directory).unwrap_or(file).to_string_lossy();
+    let shown = relative(directory, file);
+    let shown = shown.to_string_lossy();
     let shown = quick_xml::escape::escape(shown.as_ref());
     format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{shown}\"/>\n")
+}
+
+/// The time and the file of a line.
+fn parse(directory: &Path, line: &str) -> Option<(f64, PathBuf)> {
+    let rest = line.strip_prefix("<DataSet timestep=\"")?;
+    let (time, rest) = rest.split_once('"')?;
+    let (_, rest) = rest.split_once("file=\"")?;
+    let (file, _) = rest.split_once('"')?;
+    let file = quick_xml::escape::unescape(file).ok()?;
+    Some((time.parse().ok()?, directory.join(&*file)))
+}
+
+/// A file as it is found from a directory: with `..` where it does not lie below that, and whole
+/// where its place could not be told from there.
+fn relative(directory: &Path, file: &Path) -> PathBuf {
+    if let Ok(below) = file.strip_prefix(directory) {
+        return below.to_path_buf();
+    }
+    let here = Path::new(".");
+    let directory = if directory.as_os_str().is_empty() { here } else { directory };
+    let (Ok(from), Ok(to)) = (absolute(directory), absolute(file)) else { return file.into() };
+    let mut both = from.components().chain(to.components());
+    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    // What a link leads to may lie above or below what `..` says.
+    if common == 0 || both.any(|component| component == Component::ParentDir) {
+        return to;
+    }
+    let up = from.components().skip(common).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(common)).collect()
 }

@@ -10,7 +10,7 @@ use tombolo_deform::mesh::{Cells, NumberType};
 use super::super::MeshFile;
 use super::super::error::{Flaw, Position, Problem};
 use super::super::scanner::Scanner;
-use super::array::{Array, Numbers, decode, from_xml, read_text};
+use super::array::{Array, Numbers, Stored, from_xml, read_text};
 use super::dataset::{Dataset, points, push_cell, push_polyhedron, row};
 use super::encoding::{Compressor, Encoding, Wrapped};
 use super::kind::Kind;
@@ -27,7 +27,7 @@ pub(in super::super) fn parse(bytes: &[u8]) -> Result<MeshFile, Flaw> {
         }
     }
     let mut whole = whole.ok_or_else(|| Problem::unexpected(b"", "a Piece"))?;
-    whole.field_arrays = document.arrays(None, "FieldData")?;
+    whole.field_arrays = document.arrays(None, "FieldData", None)?;
     if document.pieces.len() > 1 {
         let count = document.pieces.len();
         whole.notes.push(format!(
@@ -247,33 +247,39 @@ impl<'a> Document<'a> {
         Ok(())
     }
 
-    /// The arrays of a section.
-    fn arrays(&self, piece: Option<usize>, section: &str) -> Result<Vec<Array>, Flaw> {
+    /// The arrays of a section; `tuples` says how many tuples each has, where that is known.
+    fn arrays(
+        &self,
+        piece: Option<usize>,
+        section: &str,
+        tuples: Option<usize>,
+    ) -> Result<Vec<Array>, Flaw> {
         self.elements
             .iter()
             .filter(|element| element.piece == piece && element.section == section)
-            .map(|element| self.array(element))
+            .map(|element| self.array(element, tuples))
             .collect()
     }
 
-    fn array(&self, element: &Element) -> Result<Array, Flaw> {
-        let numbers = self.numbers(element).map_err(at(element.position))?;
-        let number = from_xml(&element.kind).unwrap_or_default();
+    fn array(&self, element: &Element, tuples: Option<usize>) -> Result<Array, Flaw> {
+        let numbers = self.numbers(element, tuples).map_err(at(element.position))?;
+        let number = from_xml(&element.kind).map(Stored::number).unwrap_or_default();
         Ok(Array { name: element.name.clone(), components: element.components, number, numbers })
     }
 
-    fn numbers(&self, element: &Element) -> Result<Numbers, Problem> {
+    fn numbers(&self, element: &Element, tuples: Option<usize>) -> Result<Numbers, Problem> {
         // VTK stores text as the codes of its bytes, each string ended by a 0.
         let is_text = element.kind == "String";
-        let kind = if is_text { Some(NumberType::U8) } else { from_xml(&element.kind) };
+        let kind =
+            if is_text { Some(Stored::Number(NumberType::U8)) } else { from_xml(&element.kind) };
         let kind = kind.ok_or_else(|| {
             let expected = format!("a number type of VTK for array '{}'", element.name);
             Problem::unexpected(element.kind.as_bytes(), expected)
         })?;
         let wrapped = match element.form {
             Form::Text(text) => {
-                let numbers =
-                    read_text(kind, &mut Scanner::new(text), None).map_err(|flaw| flaw.problem)?;
+                let numbers = read_text(kind.number(), &mut Scanner::new(text), None)
+                    .map_err(|flaw| flaw.problem)?;
                 return if is_text { Ok(strings(&numbers)) } else { Ok(numbers) };
             }
             // An array of no values may be written as no text at all.
@@ -291,21 +297,21 @@ impl<'a> Document<'a> {
             }
         };
         let bytes = wrapped.unwrap_array(&self.encoding)?;
-        let numbers = decode(kind, &bytes, self.encoding.big_endian)?;
+        // The last byte of bits may hold more than there are values.
+        let count = tuples.map(|tuples| (tuples as u64).saturating_mul(element.components as u64));
+        let numbers = kind.decode(&bytes, self.encoding.big_endian, count);
         if is_text { Ok(strings(&numbers)) } else { Ok(numbers) }
     }
 
     fn piece(&self, index: usize) -> Result<Dataset, Flaw> {
         let Some(piece) = self.pieces.get(index) else { return Ok(Dataset::default()) };
-        let mut dataset = Dataset {
-            point_arrays: self.arrays(Some(index), "PointData")?,
-            cell_arrays: self.arrays(Some(index), "CellData")?,
-            ..Dataset::default()
-        };
-        if let Some(array) = self.arrays(Some(index), "Points")?.into_iter().next() {
+        let mut dataset = Dataset::default();
+        if let Some(array) = self.arrays(Some(index), "Points", None)?.into_iter().next() {
             dataset.points = points(array)?;
         }
         Problem::check_count("points of a piece", dataset.points.len(), piece.point_count)?;
+        let tuples = Some(dataset.points.len());
+        dataset.point_arrays = self.arrays(Some(index), "PointData", tuples)?;
         if self.polygonal {
             // Cell data are in the order in which VTK numbers the cells, which is this one.
             for kind in Kind::ALL {
@@ -323,6 +329,8 @@ impl<'a> Document<'a> {
             let count = dataset.cells.len();
             Problem::check_count("cells of a piece", count, piece.cell_count.unwrap_or(count))?;
         }
+        let tuples = Some(dataset.cells.len());
+        dataset.cell_arrays = self.arrays(Some(index), "CellData", tuples)?;
         Ok(dataset)
     }
 
@@ -366,7 +374,9 @@ impl<'a> Document<'a> {
                 && element.name.eq_ignore_ascii_case(name)
         };
         match self.elements.iter().find(of_name) {
-            Some(element) => Ok(self.array(element)?.integers().map_err(at(element.position))?),
+            Some(element) => {
+                Ok(self.array(element, None)?.integers().map_err(at(element.position))?)
+            }
             None => Ok(Vec::new()),
         }
     }

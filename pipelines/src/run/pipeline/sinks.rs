@@ -9,7 +9,9 @@ use super::super::output::{Frame, Output};
 use super::prepare::Names;
 use super::{Prepared, Progress, Seen};
 use crate::extract::{Field, Snapshot, is_absent, skin};
-use crate::language::{Change, Command, Log, Order, OrderStage, StreamStage, Write, file_pattern};
+use crate::language::{
+    Change, Command, Log, Order, OrderStage, StreamStage, Write, file_pattern, series_of,
+};
 
 impl Prepared {
     pub(super) fn stream(&self, stage: &StreamStage, progress: &mut Progress) {
@@ -45,9 +47,17 @@ impl Prepared {
         match file_pattern(&stage.file, cycle, time) {
             Ok(path) => {
                 let pipeline = Arc::clone(&self.name);
-                let keep = stage.keep;
+                let (series, keep) = series_of(&self.pipeline, &stage.file);
                 progress.cost.bytes += extract.bytes() as u64;
-                progress.outputs.push(Output::Write { pipeline, path, cycle, time, extract, keep });
+                progress.outputs.push(Output::Write {
+                    pipeline,
+                    path,
+                    cycle,
+                    time,
+                    extract,
+                    series,
+                    keep,
+                });
             }
             Err(problem) => progress.errors.push(("write".into(), problem.to_string())),
         }
