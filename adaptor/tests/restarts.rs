@@ -160,6 +160,8 @@ struct Killed {
     acknowledged: Vec<String>,
     /// The state that the next run goes on from, and its cycle.
     state: Option<(Vec<u8>, Mesh, u64)>,
+    /// The line of the journal about it.
+    line: String,
 }
 
 impl Killed {
@@ -172,6 +174,7 @@ impl Killed {
             sent: 0,
             acknowledged: Vec::new(),
             state: None,
+            line: String::new(),
         }
     }
 
@@ -210,8 +213,8 @@ impl Killed {
     /// The last cycle of which the journal tells behind the checkpoint.
     fn known(&self) -> usize {
         let journal = self.journal();
-        let mark = journal.rfind("{\"checkpoint\":").unwrap_or(journal.len());
-        last_cycle(&journal[mark..])
+        let (_, after) = journal.split_once(&self.line).unwrap_or_default();
+        last_cycle(after)
     }
 
     /// Runs with a viewer that asks for this and that, and is killed; says how many cycles it has
@@ -234,6 +237,9 @@ impl Killed {
             if Some(cycle) == saved {
                 let bytes = solver.adaptor.checkpoint().to_bytes();
                 state = Some((bytes, solver.mesh.clone(), solver.cycle));
+                let journal = self.journal();
+                let checkpoints = journal.lines().filter(|it| it.starts_with("{\"checkpoint\":"));
+                self.line = checkpoints.last().unwrap().to_owned();
             }
             step(&mut solver, &mut done);
             std::thread::sleep(Duration::from_micros(self.random.u64(..3000)));
@@ -255,13 +261,14 @@ impl Killed {
         again
     }
 
-    /// Has the disk lose what came after some place behind the last checkpoint, as one does that
-    /// loses its power.
+    /// Has the disk lose what came after some place, as one does that loses its power; it may be that
+    /// of the line about the last checkpoint.
     fn lose_power(&mut self) {
         let journal = self.journal();
         let mark = journal.rfind("{\"checkpoint\":").unwrap();
         // The first line of a run is on disk before it begins.
-        let mark = mark.max(journal.rfind("{\"run\":").unwrap());
+        let begun = journal.rfind("{\"run\":").unwrap();
+        let mark = mark.max(begun + journal[begun..].find('\n').unwrap() + 1);
         let end = mark + self.random.u64(..(journal.len() - mark) as u64 + 1) as usize;
         let end = journal.floor_char_boundary(end);
         std::fs::write(self.file(), &journal[..end]).unwrap();
