@@ -505,3 +505,12 @@ def test_a_slow_reader_is_shown_the_newest_frame_and_not_each_one(begin):
             cycles.append(next(frames).data.cycle)
         # Some were under way, and 64 are kept of those that came.
         assert len(cycles) < 150
+
+
+def test_a_command_is_done_once_the_solver_has_it(begin):
+    running = begin(step=3.0)
+    with tombolo.connect(running.link) as run:
+        run.drive()
+        command = run.set("heating", 7, timeout=60)
+        assert command.cycle is not None
+        wait(lambda: 7 in running.heating)

@@ -19,13 +19,11 @@ use crate::{
 };
 use clap::Args;
 
-use super::{ANSWER, NOT_YET, Target, failed, refused, steer};
+use super::{ANSWER, NOT_YET, Target, WAIT, failed, refused, steer};
 use crate::program::{Failure, read, say};
 
 /// How long the bar is, in characters.
 const BAR: usize = 30;
-/// How long a solver that computes is waited for at once.
-const WAIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {
