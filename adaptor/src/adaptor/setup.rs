@@ -195,6 +195,7 @@ impl Adaptor {
             is_replay,
             meetings: Meetings::default(),
             timing: Timing::default(),
+            look: None,
         };
         if let Some(cycle) = met.filter(|_| adaptor.skips_meetings()) {
             adaptor.note_meeting(cycle);

@@ -126,6 +126,11 @@ impl Run {
         self.adaptor.invitation(terminal)
     }
 
+    /// Has something called while the solver waits: see [`Adaptor::while_waiting`].
+    pub fn while_waiting(&mut self, look: impl FnMut() + Send + 'static) {
+        self.adaptor.while_waiting(look);
+    }
+
     /// The steering of the step that follows.
     #[must_use]
     pub fn asked(&self) -> &Asked {
