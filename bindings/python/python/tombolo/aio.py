@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import time as clock
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
+from . import _json
 from .errors import CallError, WaitError
 from .orders import Command, Edits, Forecast, Order
+from .run import _text
 
 if TYPE_CHECKING:
+    from . import _native
     from .events import Event
     from .run import Run
     from .state import Status
@@ -83,52 +87,64 @@ class AsyncRun:
         self.run = run
 
     async def order(self, edits: Edits, **settings: Any) -> AsyncOrder:
-        """As `Run.order`."""
-        return AsyncOrder(await asyncio.to_thread(lambda: self.run.order(edits, **settings)))
+        """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
+        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(text, name))))
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
-        return AsyncOrder(await asyncio.to_thread(self.run.undo, count))
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(count))))
 
     async def forecast(self, edits: Edits, *, timeout: Optional[float] = None, **settings: Any) -> Forecast:
         """As `Run.forecast`."""
-        return await asyncio.to_thread(lambda: self.run.forecast(edits, timeout=timeout, **settings))
+        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        question = await self._send(lambda client: client.forecast(text, name))
+        return await _in_slices(lambda left: self.run._foretold(question, left), timeout)
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
         """As `Run.link_for`."""
         return await asyncio.to_thread(lambda: self.run.link_for(rights, timeout))
 
-    async def _give(self, give: Callable[[], Command], timeout: Optional[float]) -> Command:
-        command = await asyncio.to_thread(give)
+    async def _send(self, send: Callable[[_native.Client], str]) -> str:
+        """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
+        await self.drive()
+        return await asyncio.to_thread(lambda: send(self.run._reader.client))
+
+    async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
+        command = Command(self.run, await self._send(send), task)
         return await _in_slices(command.wait, timeout)
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
-        return await self._give(lambda: self.run.set(parameter, value, wait=False), timeout)
+        return await self._give(lambda client: client.set(parameter, float(value)), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.pause`."""
-        return await self._give(lambda: self.run.pause(wait=False), timeout)
+        return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.resume`."""
-        return await self._give(lambda: self.run.resume(wait=False), timeout)
+        return await self._give(lambda client: client.resume(), "resume", timeout)
 
     async def stop(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.stop`."""
-        return await self._give(lambda: self.run.stop(wait=False), timeout)
+        return await self._give(lambda client: client.stop(), "stop", timeout)
 
     async def cancel(self, order: Union[Order, str], *, timeout: Optional[float] = None) -> Command:
         """As `Run.cancel`."""
-        return await self._give(lambda: self.run.cancel(order, wait=False), timeout)
+        identity = order.id if isinstance(order, Order) else order
+        return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
 
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
         """As `Run.change_pipelines`."""
-        return await self._give(lambda: self.run.change_pipelines(change, wait=False), timeout)
+        text = _json.text(change, "pipelines")
+        return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
     async def drive(self, timeout: float = 8.0) -> None:
         """As `Run.drive`."""
-        await asyncio.to_thread(self.run.drive, timeout)
+        until = clock.monotonic() + timeout
+        while not await asyncio.to_thread(self.run._ask_for_wheel, until):
+            pass
 
     async def surface(self) -> Surface:
         """As `Run.surface`."""
