@@ -173,6 +173,7 @@ class Relay:
             while block := one.recv(65536):
                 if not self.swallows:
                     two.sendall(block)
+            two.shutdown(socket.SHUT_WR)
         except OSError:
             pass
 
