@@ -19,7 +19,7 @@ mod waiting;
 pub use stopper::Stopper;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     net::SocketAddr,
     path::Path,
     path::PathBuf,
@@ -120,6 +120,8 @@ pub struct Adaptor {
     timing: Timing,
     /// What is called while the solver waits.
     look: Option<waiting::Look>,
+    /// The channels whose vertices have two coordinates.
+    in_plane: BTreeSet<String>,
 }
 
 /// When the ranks come together.

@@ -196,6 +196,7 @@ impl Adaptor {
             meetings: Meetings::default(),
             timing: Timing::default(),
             look: None,
+            in_plane: Default::default(),
         };
         if let Some(cycle) = met.filter(|_| adaptor.skips_meetings()) {
             adaptor.note_meeting(cycle);

@@ -209,6 +209,9 @@ impl Run {
         let mut lender = Lender::default();
         let given = lender.channels(channels);
         let dimensions = given.as_ref().map_or_else(|_| Vec::new(), Channels::dimensions);
+        // A motion along the third axis would be lost.
+        let flat = dimensions.iter().filter(|(_, dimension)| *dimension == 2);
+        flat.for_each(|(channel, _)| run.keep_in_plane(channel));
         let step = tombolo::Step { cycle, time, time_step };
         let looked_at = run.looks_at(&step);
         let given = given.map(|channels| Shown { step, looked_at, channels: channels.0 });

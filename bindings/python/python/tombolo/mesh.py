@@ -55,7 +55,8 @@ class Mesh:
     Parameters
     ----------
     points : array of shape (n, 2) or (n, 3)
-        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis.
+        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis. With two of them,
+        orders that would move a vertex along the third axis are rejected.
     cells : dict, optional
         From cell types to vertex numbers, counted from 0, a row for each cell: ``{"tetra": tets}`` with an array
         `(m, 4)`. Types are called `vertex`, `line`, `triangle`, `quad`, `tetra`, `hexahedron`, `wedge`, `pyramid`, ...

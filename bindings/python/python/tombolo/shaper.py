@@ -225,7 +225,8 @@ class Shaper:
         ConfigurationError
             Something is wrong with the edits, with line, column and path.
         RejectedError
-            The mesh would be broken. The text says where; `report` has the fraction that would pass.
+            The mesh would be broken, or one of two coordinates would leave its plane. The text says where; `report` has
+            the fraction that would pass.
         """
         text, name = _json.order(edits, settings)
         points, told = self._work(lambda: self._shaper.shape(text, name), progress)
@@ -238,7 +239,7 @@ class Shaper:
         return Forecast(_json.loads(self._work(lambda: self._shaper.forecast(text, name), progress)))
 
     def displacement(self, edits: Edits, *, progress: Optional[Progress] = None) -> NDArray[np.float64]:
-        """Find how far edits move each vertex of the surface: a row for each of `surface.points`.
+        """Find how far edits move each vertex of the surface: a row `(x, y, z)` for each of `surface.points`.
 
         An edit ``{"displacement": {"vertices": surface.vertices, "values": ...}}`` takes it again.
         """
