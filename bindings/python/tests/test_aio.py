@@ -90,3 +90,22 @@ def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
         assert time.monotonic() - begun < 15
         late.cancel()
     relay.server.close()
+
+
+def test_events_go_on_after_one_was_waited_for_in_vain(begin):
+    running = begin(step=0.2)
+    with tombolo.connect(running.link) as run:
+
+        async def follow():
+            events, cycles, waited = run.aio.events("monitor"), [], 0
+            while len(cycles) < 5:
+                try:
+                    cycles.append((await asyncio.wait_for(events.__anext__(), 0.03)).data["cycle"])
+                except asyncio.TimeoutError:
+                    waited += 1
+            return cycles, waited
+
+        cycles, waited = asyncio.run(follow())
+    assert waited > 3
+    # None is lost.
+    assert cycles == list(range(cycles[0], cycles[0] + 5))

@@ -15,6 +15,7 @@ from .run import _text
 
 if TYPE_CHECKING:
     from . import _native
+    from ._reader import Reader
     from .events import Event
     from .run import Run
     from .state import Status
@@ -62,6 +63,30 @@ class AsyncOrder:
 
     def __repr__(self) -> str:
         return repr(self.order)
+
+
+class _Events(AsyncIterator["Event"]):
+    """What a run tells. No generator, which the cancellation of one wait for an event would end for good."""
+
+    def __init__(self, reader: Reader, kinds: tuple[str, ...]) -> None:
+        self._reader, self._kinds = reader, kinds
+        self._waiting: deque[Event] = reader.listen()
+        self._is_over = False
+
+    async def __anext__(self) -> Event:
+        while not self._is_over:
+            # The thread only waits: of one that was cancelled the event would be lost.
+            try:
+                await _in_slices(lambda left: self._reader.wait_for(lambda: len(self._waiting) > 0, left), None)
+            except CallError:
+                break
+            if self._waiting:
+                event = self._waiting.popleft()
+                self._is_over = event.kind == "ended"
+                if not self._kinds or event.kind in self._kinds:
+                    return event
+        self._is_over = True
+        raise StopAsyncIteration
 
 
 class AsyncRun:
@@ -176,19 +201,8 @@ class AsyncRun:
         return await _in_slices(self.run.wait, timeout)
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
-        """As `Run.events`, for `async for`."""
-        return self._events(self.run._reader.listen(), kinds)
-
-    async def _events(self, waiting: deque[Event], kinds: tuple[str, ...]) -> AsyncIterator[Event]:
-        while True:
-            try:
-                event = await _in_slices(lambda left: self.run._reader.next(waiting, left), None)
-            except CallError:
-                return
-            if not kinds or event.kind in kinds:
-                yield event
-            if event.kind == "ended":
-                return
+        """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
+        return _Events(self.run._reader, kinds)
 
     async def close(self) -> None:
         """As `Run.close`."""
