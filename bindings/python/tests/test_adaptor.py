@@ -399,3 +399,21 @@ def test_signals_are_handled_while_a_solver_waits(tmp_path, waits_for_viewer, ra
         signalled.join()
         signal.signal(signal.SIGUSR1, before)
         adaptor.finalize()
+
+
+def test_masked_values_are_refused():
+    temperature = np.ma.masked_array(np.arange(27.0))
+    shown = mesh(fields={"temperature": temperature})
+    # A mask that hides nothing is none.
+    assert _native.lent(shown)
+    temperature[3] = np.ma.masked
+    masked = np.ma.masked_array(POINTS, mask=POINTS > 0.9)
+    separate = [np.ma.masked_array(axis, mask=axis > 0.9) for axis in POINTS.T]
+    for given, what in (
+        (shown, "field 'temperature'"),
+        (mesh(masked), "points"),
+        (mesh(separate), "points, component 0"),
+        (mesh(vertex_features=np.ma.masked_equal(np.arange(27), 5)), "vertex_features"),
+    ):
+        with pytest.raises(tombolo.MeshError, match=f"{what}.* masked"):
+            _native.lent(given)

@@ -195,6 +195,9 @@ def test_what_is_no_mesh_is_told():
     ):
         with pytest.raises(tombolo.MeshError, match=text):
             tombolo.Shaper(*given)
+    for given in (tombolo.Mesh(POINTS, {"tetra": TETS}), meshio.Mesh(POINTS, [("tetra", TETS)])):
+        with pytest.raises(tombolo.MeshError, match="faces: found them without cells"):
+            tombolo.Shaper(given, faces=FACES)
     shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
     with pytest.raises(tombolo.MeshError, match="one for each vertex"):
         shaper.quality(POINTS[:-1])

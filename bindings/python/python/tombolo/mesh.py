@@ -82,7 +82,8 @@ class Mesh:
     -----
     Arrays of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first, with strides,
     read-only. Cells of one type are borrowed where their array is contiguous. Anything else, such as another byte
-    order, negative strides or float16, is copied once it is looked at or is an error that says so.
+    order, negative strides or float16, is copied once it is looked at or is an error that says so. An array of
+    `numpy.ma` of which values are masked is an error.
 
     Examples
     --------

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
 from ._waiting import in_thread
+from .errors import MeshError
 from .mesh import Cells, Faces, Mesh, faces_of_features
 from .orders import Forecast
 from .views import Surface
@@ -163,6 +164,8 @@ class Shaper:
     ) -> None:
         if cells is not None:
             mesh = Mesh(mesh, cells, faces=faces)
+        elif faces is not None:
+            raise MeshError("faces: found them without cells, expected both or neither: a mesh has its own parts")
         elif not isinstance(mesh, (Mesh, Mapping)):
             if hasattr(mesh, "cells_dict") and hasattr(mesh, "point_sets"):
                 mesh = _of_meshio(mesh)
