@@ -403,6 +403,7 @@ fn the_program_reaches_a_run() {
     write("link.txt", &format!("viewer: {}\n", run.link));
     write("squeeze.json", &squeeze(0.3).to_string());
     write("too-far.json", &squeeze(1.5).to_string());
+    write("nothing.json", "[]");
     write("slip.json", r#"[{"translate": {"featurs": ["z-max"], "by": [0, 0, 1]}}]"#);
     let call = |arguments: &[&str]| tombolo(directory.path(), arguments);
     for (arguments, code, expected) in [
@@ -416,6 +417,7 @@ fn the_program_reaches_a_run() {
         (&["order", "link.txt", "squeeze.json", "--wait"], 0, "applied"),
         (&["order", "link.txt", "too-far.json", "--wait"], 1, "rejected"),
         (&["order", "link.txt", "slip.json"], 1, "did you mean `features`?"),
+        (&["order", "link.txt", "nothing.json"], 2, "nothing.json: expected at least one edit"),
         (&["undo", "link.txt", "--wait"], 0, "applied"),
         (&["set", "link.txt", "inflow", "2"], 0, ""),
         (&["set", "link.txt", "inflow", "NaN"], 2, "expected a number"),

@@ -182,6 +182,9 @@ def test_what_would_break_the_mesh_is_rejected_and_forecast():
         shaper.shape([{"translat": {}}])
     with pytest.raises(tombolo.ConfigurationError, match="undo"):
         shaper.shape({"undo": 1})
+    for nothing in ([], {"edits": []}):
+        with pytest.raises(tombolo.ConfigurationError, match="expected at least one edit"):
+            shaper.shape(nothing)
     with pytest.raises(tombolo.TomboloError, match="top"):
         shaper.displacement([{"translate": {"features": ["tpo"], "by": [0, 0, 1]}}])
 
