@@ -14,11 +14,12 @@ mod tagged;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod waiting;
 
 pub use stopper::Stopper;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     net::SocketAddr,
     path::Path,
     path::PathBuf,
@@ -119,6 +120,10 @@ pub struct Adaptor {
     is_replay: bool,
     meetings: Meetings,
     timing: Timing,
+    /// What is called while the solver waits.
+    look: Option<waiting::Look>,
+    /// The channels whose vertices have two coordinates.
+    in_plane: BTreeSet<String>,
 }
 
 /// When the ranks come together.
@@ -480,11 +485,7 @@ impl Adaptor {
             let begun = Instant::now();
             self.take_reference(step, channels)?;
             self.timing.reference.add(begun.elapsed());
-            if let Some(hub) = self.hub.as_ref().filter(|_| self.config.steering.wait_for_viewer) {
-                let begun = Instant::now();
-                hub.wait_for_viewer(|| self.queue.has_stop());
-                self.timing.paused.add(begun.elapsed());
-            }
+            self.wait_for_viewer();
         }
         let mut commands = Vec::new();
         if self.pipelines.is_due(moment) {
@@ -509,16 +510,7 @@ impl Adaptor {
         let begun = Instant::now();
         self.serve(moment, channels);
         self.timing.steering.add(begun.elapsed());
-        if self.paused {
-            let begun = Instant::now();
-            while self.paused && !self.stopped {
-                if self.communicator.rank() == 0 {
-                    self.queue.wait();
-                }
-                self.serve(moment, channels);
-            }
-            self.timing.paused.add(begun.elapsed());
-        }
+        self.wait_for_resume(moment, channels);
         let SteeredMesh::Steered(steerer, _) = &mut self.mesh else { return Ok(false) };
         let moved = steerer.next_shape(moment, step.time_step);
         steerer.look_ahead(self.timed.next_order());

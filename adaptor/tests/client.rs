@@ -106,10 +106,22 @@ fn applied(client: &Client, id: &str) {
     });
 }
 
-/// Passes connections on to a run, and drops them when it is told to.
+/// Passes connections on to a run, and swallows what they carry or drops them when it is told to.
 struct Proxy {
     port: u16,
     open: Arc<Mutex<Vec<TcpStream>>>,
+    swallows: Arc<AtomicBool>,
+}
+
+/// Passes on what comes from one side, until either ends.
+fn pass(mut from: TcpStream, mut to: TcpStream, swallows: &AtomicBool) {
+    let mut bytes = vec![0; 1 << 16];
+    while let Ok(count @ 1..) = from.read(&mut bytes) {
+        if !swallows.load(Ordering::Relaxed) && to.write_all(&bytes[..count]).is_err() {
+            break;
+        }
+    }
+    let _ = to.shutdown(std::net::Shutdown::Both);
 }
 
 impl Proxy {
@@ -117,21 +129,24 @@ impl Proxy {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let port = listener.local_addr().expect("an address").port();
         let open = Arc::new(Mutex::new(Vec::new()));
-        let known = Arc::clone(&open);
+        let swallows = Arc::new(AtomicBool::new(false));
+        let (known, is_hole) = (Arc::clone(&open), Arc::clone(&swallows));
         std::thread::spawn(move || {
             for near in listener.incoming().flatten() {
                 let Ok(far) = TcpStream::connect(address) else { continue };
                 let copy = |stream: &TcpStream| stream.try_clone().expect("a copy");
                 known.lock().expect("no panic").extend([copy(&near), copy(&far)]);
-                for (mut from, mut to) in [(copy(&near), copy(&far)), (far, near)] {
-                    std::thread::spawn(move || {
-                        let _ = std::io::copy(&mut from, &mut to);
-                        let _ = to.shutdown(std::net::Shutdown::Both);
-                    });
+                for (from, to) in [(copy(&near), copy(&far)), (far, near)] {
+                    let is_hole = Arc::clone(&is_hole);
+                    std::thread::spawn(move || pass(from, to, &is_hole));
                 }
             }
         });
-        Self { port, open }
+        Self { port, open, swallows }
+    }
+
+    fn swallow(&self, swallows: bool) {
+        self.swallows.store(swallows, Ordering::Relaxed);
     }
 
     fn drop_all(&self) {
@@ -268,6 +283,31 @@ fn a_lost_connection_is_made_again_and_an_order_is_given_once() {
 }
 
 #[test]
+fn a_command_that_the_network_swallows_is_sent_again() {
+    let run = Run::new(LINK_TO_ALL);
+    let proxy = Proxy::to(run.address);
+    let client = Client::connect(&run.over(proxy.port), &quick()).expect("connected");
+    client.drive(PATIENCE).expect("the wheel");
+    proxy.swallow(true);
+    let id = client.set("inflow", 2.0).expect("sent");
+    // However long nobody answers, it is not given up.
+    std::thread::sleep(Duration::from_secs(2));
+    proxy.drop_all();
+    proxy.swallow(false);
+    let begun = Instant::now();
+    loop {
+        assert!(begun.elapsed() < PATIENCE, "the command is lost");
+        match client.next(PATIENCE).expect("connected").expect("an event").event {
+            Event::Done(done) if done.id == id => break,
+            Event::Error(error) => panic!("{}", error.message),
+            _ => {}
+        }
+    }
+    drop(client);
+    run.end();
+}
+
+#[test]
 fn a_closed_client_has_let_go_of_the_wheel_while_it_is_still_there() {
     let run = Run::new(MONITORED);
     let first = Client::connect(&run.link, &Options::default()).expect("connected");
@@ -363,6 +403,7 @@ fn the_program_reaches_a_run() {
     write("link.txt", &format!("viewer: {}\n", run.link));
     write("squeeze.json", &squeeze(0.3).to_string());
     write("too-far.json", &squeeze(1.5).to_string());
+    write("nothing.json", "[]");
     write("slip.json", r#"[{"translate": {"featurs": ["z-max"], "by": [0, 0, 1]}}]"#);
     let call = |arguments: &[&str]| tombolo(directory.path(), arguments);
     for (arguments, code, expected) in [
@@ -376,6 +417,7 @@ fn the_program_reaches_a_run() {
         (&["order", "link.txt", "squeeze.json", "--wait"], 0, "applied"),
         (&["order", "link.txt", "too-far.json", "--wait"], 1, "rejected"),
         (&["order", "link.txt", "slip.json"], 1, "did you mean `features`?"),
+        (&["order", "link.txt", "nothing.json"], 2, "nothing.json: expected at least one edit"),
         (&["undo", "link.txt", "--wait"], 0, "applied"),
         (&["set", "link.txt", "inflow", "2"], 0, ""),
         (&["set", "link.txt", "inflow", "NaN"], 2, "expected a number"),
@@ -417,6 +459,25 @@ fn the_program_reaches_a_run() {
     let told = lines(&watching.2);
     assert_eq!((watching.0, &told.last().expect("a line")["end"]["how"]), (0, &"finished".into()));
     assert_eq!(run.end().orders.len(), 4);
+}
+
+#[test]
+fn the_program_waits_until_a_command_has_taken_effect() {
+    let run = Run::new(LINK_TO_ALL);
+    let watches = Options { watches: true, ..Options::default() };
+    let watching = Client::connect(&run.link, &watches).expect("connected");
+    run.rest.store(4000, Ordering::Relaxed);
+    let cycle = watching.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
+    let status = watching.wait_for_status(PATIENCE, |status| status.cycle > cycle + 1);
+    let cycle = status.expect("a step").cycle;
+    let (code, said, _) =
+        tombolo(Path::new("."), &["set", &run.link.to_string(), "inflow", "2", "--json"]);
+    let told: Value = serde_json::from_str(&said).expect("JSON");
+    let at = told["done"]["cycle"].as_u64();
+    assert!(code == 0 && at.is_some_and(|at| at > cycle), "{code}: {said}");
+    run.rest.store(2, Ordering::Relaxed);
+    drop(watching);
+    run.end();
 }
 
 #[test]

@@ -3,6 +3,11 @@
 
 mod common;
 
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
+
 use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
 use tombolo::{OrderStatus, Settings, pipelines::language::parse_orders};
@@ -106,6 +111,29 @@ fn a_stop_gives_shapes_up_where_nobody_watches() {
     let order = &report.orders[0];
     assert_eq!(order.status, OrderStatus::Rejected);
     assert!(order.reason.as_deref().unwrap().contains("given up"), "{order:?}");
+}
+
+#[test]
+fn a_host_is_called_while_its_solver_waits() {
+    let pause = parse_orders(r#"[{"at": {"cycle": 0}, "pause": {}}]"#, "orders.json").unwrap();
+    for (steering, orders) in [("{}", pause), (r#"{"wait_for_viewer": true}"#, Vec::new())] {
+        let config = config(&format!(
+            r#"{{"version": 1, "stream": {{"listen": "127.0.0.1:0"}}, "steering": {steering}}}"#
+        ));
+        let mut solver = Solver::new(Settings { config, orders, ..Settings::default() });
+        let stopper = solver.adaptor.stopper();
+        let (calls, thread) = (Arc::new(AtomicU64::new(0)), std::thread::current().id());
+        let counted = Arc::clone(&calls);
+        solver.adaptor.while_waiting(move || {
+            assert_eq!(std::thread::current().id(), thread);
+            if counted.fetch_add(1, Ordering::Relaxed) == 2 {
+                stopper.stop();
+            }
+        });
+        solver.step();
+        assert!(solver.stopped);
+        assert!(calls.load(Ordering::Relaxed) >= 3, "{steering}");
+    }
 }
 
 #[test]

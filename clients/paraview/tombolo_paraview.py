@@ -7,7 +7,8 @@ It cannot be called `tombolo.py`: ParaView puts a plug-in into `sys.modules` und
 hide the package.
 
 Filters of edits are chained. Each adds its edit to the list that comes with the surface (the field data `edits`) and
-the array `displacement`, which the same kernel computes that moves the solver's mesh.
+the array `displacement`, which the same kernel computes that moves the solver's mesh. Behind a displacement that no
+list of edits stands for, as that of two chains combined, the list begins with it.
 """
 
 import json
@@ -122,6 +123,36 @@ def _vertices(data):
 def _edits(data):
     """The edits that come with the input."""
     return json.loads((vtk.texts(data, "edits") or ["[]"])[0])
+
+
+def _as_edit(vertices, moved):
+    """A displacement as an edit of the vertices that move."""
+    kept = np.flatnonzero(np.any(moved != 0, axis=1))
+    return {"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}
+
+
+def _edits_or_displacement(data):
+    """The edits that come with the input; where there are none but it has a displacement, that one as an edit."""
+    edits = _edits(data)
+    if edits or not data.GetPointData().HasArray("displacement"):
+        return edits
+    return [_as_edit(_vertices(data), _displacement(data, "displacement"))]
+
+
+def _of_points(edits, data):
+    """The same edits with displacements of the points of the input, in place of the vertices of the solver's mesh."""
+    made = []
+    for edit in edits:
+        if "displacement" in edit:
+            known, vertices = _vertices(data), edit["displacement"]["vertices"]
+            if not np.isin(vertices, known).all():
+                raise tombolo.MeshError("the input: found points left out, expected all that its edits move")
+            sorter = np.argsort(known)
+            points = sorter[np.searchsorted(known, vertices, sorter=sorter)]
+            made.append({"displacement": {**edit["displacement"], "vertices": points.tolist()}})
+        else:
+            made.append(edit)
+    return made
 
 
 def _setter(name):
@@ -274,7 +305,8 @@ class TomboloSurface(_Source):
 class TomboloFeaturesByAngle(_Algorithm):
     """Names the parts of a surface between sharp edges, in place of those that the run has.
 
-    The run does not know these names: an order of edits with them is sent as the displacement that they make.
+    The run does not know these names: an order of edits with them is sent as the displacement that they make. What
+    edits before it have moved stays moved.
     """
 
     angle = 30.0
@@ -310,8 +342,9 @@ class _Edit(_Algorithm):
 
     def run(self, output, surface):
         output.ShallowCopy(surface)
-        edits = [*_edits(surface), self.edit()]
-        vtk.add(output.GetPointData(), "displacement", vtk.shaper(surface).displacement(edits))
+        edits = [*_edits_or_displacement(surface), self.edit()]
+        moved = vtk.shaper(surface).displacement(_of_points(edits, surface))
+        vtk.add(output.GetPointData(), "displacement", moved)
         vtk.set_texts(output, "edits", [json.dumps(edits)])
 
 
@@ -422,7 +455,7 @@ class TomboloCombine(_Algorithm):
         output.ShallowCopy(first)
         sum_of_both = self.weights[0] * moved[0] + self.weights[1] * moved[1]
         vtk.add(output.GetPointData(), "displacement", sum_of_both)
-        # It is a sum, which no list of edits is.
+        # It is a sum, which no list of edits is: one behind it begins with the displacement itself.
         output.GetFieldData().RemoveArray("edits")
 
 
@@ -506,8 +539,7 @@ class TomboloOrder(_Algorithm):
             if not np.array_equal(surface.vertices[at], vertices):
                 raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
             moved = vtk.points(data) - surface.points[at]
-        kept = np.flatnonzero(np.any(moved != 0, axis=1))
-        return [{"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}]
+        return [_as_edit(vertices, moved)]
 
     def _ask(self, request):
         """Asks for something, and tells what is wrong each time."""

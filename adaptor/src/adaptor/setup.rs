@@ -197,6 +197,8 @@ impl Adaptor {
             is_replay,
             meetings: Meetings::default(),
             timing: Timing::default(),
+            look: None,
+            in_plane: Default::default(),
         };
         if let Some(cycle) = met.filter(|_| adaptor.skips_meetings()) {
             adaptor.note_meeting(cycle);

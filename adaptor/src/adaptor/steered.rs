@@ -61,6 +61,14 @@ impl Adaptor {
         steering
     }
 
+    /// Says that the vertices of a channel have two coordinates for the solver, so that orders which
+    /// move any along z are rejected. Before its first step; what rank 0 says counts.
+    pub fn keep_in_plane(&mut self, channel: &str) {
+        if !self.in_plane.contains(channel) {
+            self.in_plane.insert(channel.to_owned());
+        }
+    }
+
     fn refuse(&mut self, reason: &str) {
         if self.communicator.rank() == 0 {
             self.complain(reason);
@@ -218,9 +226,10 @@ impl Adaptor {
             || self.timed.drags_skeleton()
             || self.pipelines.drags_skeleton();
         let (log, queue) = (Arc::clone(&self.log), Arc::clone(&self.queue));
+        let in_plane = self.in_plane.contains(channel.name);
         let resumed = &mut self.resumed;
         Ok(shaper.and_then(|shaper| {
-            let shaper = shaper.with_clock(clock);
+            let shaper = shaper.with_clock(clock).in_plane(in_plane);
             let mut steerer = Steerer::new(shaper, self.defaults.clone(), log, queue, skeleton)
                 .map_err(|error| format!("a thread could not be started: {error}"))?;
             resumed.hand_over(&mut steerer)?;

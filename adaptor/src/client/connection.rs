@@ -34,8 +34,8 @@ const TEXT: usize = 2 * DOCUMENT.most;
 const WRITE: Duration = Duration::from_secs(10);
 /// How long the last words to a server may take.
 const CLOSE: Duration = Duration::from_millis(500);
-/// How often it is looked for commands that nothing answers, and the wheel is asked for again.
-const SETTLE: Duration = Duration::from_millis(200);
+/// How often the wheel is asked for again, and it is looked whether the server is silent.
+const REGAIN: Duration = Duration::from_millis(200);
 /// The version of the protocol.
 const PROTOCOL: u32 = 2;
 
@@ -178,7 +178,7 @@ async fn first_text(socket: &mut Socket) -> Result<String, Option<CloseFrame>> {
 async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Over {
     let mut decoder = Decoder::new();
     let (mut frames, mut acknowledged) = (0_u64, 0_u64);
-    let mut settle = tokio::time::interval(SETTLE);
+    let mut regain = tokio::time::interval(REGAIN);
     let mut heard = Instant::now();
     loop {
         // One that asks for no views acknowledges the first frame alone: no more than two of each
@@ -205,8 +205,8 @@ async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Ove
         let message = tokio::select! {
             message = socket.next() => message,
             () = shared.wake.notified() => continue,
-            _ = settle.tick() => {
-                shared.with(super::state::State::settle);
+            _ = regain.tick() => {
+                shared.with(super::state::State::regain);
                 if heard.elapsed() > SILENT {
                     return Over::Lost(format!("silence of {} seconds", SILENT.as_secs()));
                 }

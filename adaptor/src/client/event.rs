@@ -18,7 +18,7 @@ pub struct Received {
     /// The message, decoded.
     pub event: Event,
     /// The message as it came, one JSON object; empty for a frame and for what the client itself
-    /// tells ([`Event::Lost`], [`Event::Taken`]).
+    /// tells ([`Event::Lost`]).
     pub text: Arc<str>,
 }
 
@@ -44,12 +44,6 @@ pub enum Event {
     Pipelines(PipelinesChanged),
     /// A command has taken effect.
     Done(Done),
-    /// The run has said nothing against a command for a second. One that is older than the message
-    /// `done` says no more than that.
-    Taken {
-        /// The id of the command.
-        id: String,
-    },
     /// The answer to [`Client::link_for`](super::Client::link_for).
     Link(LinkTold),
     /// The clients that are connected.

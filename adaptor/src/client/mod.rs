@@ -261,7 +261,7 @@ impl Client {
             self.shared.with(|state| state.asked.insert(id.clone(), None));
             let message = json!({"id": id, "drive": {}});
             let left = until.saturating_duration_since(Instant::now());
-            let answered = self.transmit(id.clone(), &message, true).map(|()| {
+            let answered = self.transmit(id.clone(), &message).map(|()| {
                 self.shared.wait(left.max(ASK_AGAIN), |state| {
                     let drives = state.hello.as_ref().is_some_and(|h| h.role == Role::Driver);
                     let waits = state.pending.iter().any(|pending| pending.id == id);
@@ -271,7 +271,11 @@ impl Client {
                     }
                 })
             });
-            let answer = self.shared.with(|state| state.asked.remove(&id)).flatten();
+            // Where it was heard, the hello says so, and no answer has this id.
+            let answer = self.shared.with(|state| {
+                state.pending.retain(|pending| pending.id != id);
+                state.asked.remove(&id).flatten()
+            });
             if answered?.unwrap_or(Ok(false))? {
                 return Ok(());
             }
@@ -287,13 +291,14 @@ impl Client {
         }
     }
 
-    /// Sends a command; returns its id, which comes back in the answers to it.
+    /// Sends a command; returns its id, which comes back in the answers to it: of an order in
+    /// [`Event::Order`], of a change of the pipelines in [`Event::Pipelines`], and of all others in
+    /// [`Event::Done`] once the solver has come to it. [`Event::Error`] answers one that is refused.
     ///
     /// # Errors
     /// Where too much waits for an answer, or nothing is sent any more.
     pub fn send(&self, command: &Command) -> Result<String, ClientError> {
-        let silent = !matches!(command, Command::Order(_) | Command::Pipelines(_));
-        self.say(&json!(command), silent)
+        self.say(&json!(command))
     }
 
     /// Gives an order of a new shape; returns its id.
@@ -317,7 +322,7 @@ impl Client {
     /// # Errors
     /// As of [`Client::send`].
     pub fn forecast(&self, order: &Order) -> Result<String, ClientError> {
-        self.say(&json!(Question::Forecast(order.clone())), false)
+        self.say(&json!(Question::Forecast(order.clone())))
     }
 
     /// Holds the solver at its next safe point.
@@ -363,7 +368,7 @@ impl Client {
         let id = self.id();
         self.shared.with(|state| state.asked.insert(id.clone(), None));
         let message = json!({"id": id, "link": {"for": rights}});
-        let answered = self.transmit(id.clone(), &message, false).map(|()| {
+        let answered = self.transmit(id.clone(), &message).map(|()| {
             self.shared.wait(patience, |state| match state.asked.get_mut(&id)?.take() {
                 Some(answer) => Some(Ok(answer)),
                 None => state.failure.clone().map(Err),
@@ -460,21 +465,21 @@ impl Client {
         format!("k{:08x}-{count}", self.mark)
     }
 
-    fn say(&self, message: &Value, may_be_silent: bool) -> Result<String, ClientError> {
+    fn say(&self, message: &Value) -> Result<String, ClientError> {
         let (id, mut message) = (self.id(), message.clone());
         message["id"] = json!(id);
-        self.transmit(id.clone(), &message, may_be_silent)?;
+        self.transmit(id.clone(), &message)?;
         Ok(id)
     }
 
-    fn transmit(&self, id: String, message: &Value, silent: bool) -> Result<(), ClientError> {
+    fn transmit(&self, id: String, message: &Value) -> Result<(), ClientError> {
         let text = message.to_string();
         DOCUMENT.check(text.len()).map_err(|exceeded| ClientError::TooMuch {
             what: "bytes of a command",
             found: exceeded.found,
             most: exceeded.limit.most,
         })?;
-        self.shared.send(Pending { id, text, may_be_silent: silent, sent: None })
+        self.shared.send(Pending { id, text, is_sent: false })
     }
 }
 

@@ -25,17 +25,13 @@ const COMMAND_BYTES: usize = 1 << 28;
 const WHEEL: &str = "wheel";
 /// How long it is: longer than a server takes to see that a connection is gone.
 const REGAIN: Duration = Duration::from_secs(45);
-/// How long a command that this server answers by nothing may take to be taken.
-pub(super) const UNANSWERED: Duration = Duration::from_secs(1);
 
 /// A command that was not answered yet.
 pub(super) struct Pending {
     pub(super) id: String,
     pub(super) text: String,
-    /// Whether a server that knows no `done` says nothing where all is well.
-    pub(super) may_be_silent: bool,
-    /// When it was sent over the connection there is.
-    pub(super) sent: Option<Instant>,
+    /// Whether it was sent over the connection there is.
+    pub(super) is_sent: bool,
 }
 
 /// A frame that waits to be read.
@@ -219,53 +215,32 @@ impl State {
         let regains = self.drives && hello.role == Role::Watcher;
         self.regain = regains.then(|| Instant::now() + REGAIN);
         self.pending.retain(|pending| hello.orders.iter().all(|order| order.id != pending.id));
-        self.pending.iter_mut().for_each(|pending| pending.sent = None);
+        self.pending.iter_mut().for_each(|pending| pending.is_sent = false);
     }
 
     /// Asks for the wheel again after a lost connection: a server may take a while to see that the
     /// old one is gone. Given up where somebody else drives.
-    fn regain(&mut self) {
+    pub(super) fn regain(&mut self) {
         let Some(until) = self.regain else { return };
         let driver = self.status.as_ref().and_then(|status| status.driver.as_ref());
         if Instant::now() >= until || driver.is_some() && driver != self.former.as_ref() {
             self.regain = None;
         } else if self.pending.iter().all(|pending| pending.id != WHEEL) {
             let text = format!(r#"{{"id": "{WHEEL}", "drive": {{}}}}"#);
-            let wheel = Pending { id: WHEEL.into(), text, may_be_silent: true, sent: None };
-            self.pending.push_front(wheel);
+            self.pending.push_front(Pending { id: WHEEL.into(), text, is_sent: false });
         }
     }
 
     /// The commands that were not sent over this connection.
     pub(super) fn unsent(&mut self) -> Vec<String> {
         let waits = self.regain.is_some();
-        let is_next =
-            |pending: &&mut Pending| pending.sent.is_none() && (!waits || pending.id == WHEEL);
+        let is_next = |pending: &&mut Pending| !pending.is_sent && (!waits || pending.id == WHEEL);
         let unsent = self.pending.iter_mut().filter(is_next);
-        let now = Instant::now();
         unsent
             .map(|pending| {
-                pending.sent = Some(now);
+                pending.is_sent = true;
                 pending.text.clone()
             })
             .collect()
-    }
-
-    /// Tells of commands of which a server says nothing where all is well, once it had the time to
-    /// say what is wrong; they are not sent again.
-    pub(super) fn settle(&mut self) {
-        let (mut silent, now) = (Vec::new(), Instant::now());
-        self.pending.retain(|pending| {
-            let taken = pending.sent.is_some_and(|sent| now - sent > UNANSWERED);
-            let settled = pending.may_be_silent && taken;
-            if settled && pending.id != WHEEL {
-                silent.push(pending.id.clone());
-            }
-            !settled
-        });
-        for id in silent {
-            self.put(Event::Taken { id }, "");
-        }
-        self.regain();
     }
 }

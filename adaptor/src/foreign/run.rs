@@ -135,6 +135,16 @@ impl Run {
         self.adaptor.invitation(terminal)
     }
 
+    /// Has something called while the solver waits: see [`Adaptor::while_waiting`].
+    pub fn while_waiting(&mut self, look: impl FnMut() + Send + 'static) {
+        self.adaptor.while_waiting(look);
+    }
+
+    /// Rejects orders that leave the plane of a channel: see [`Adaptor::keep_in_plane`].
+    pub fn keep_in_plane(&mut self, channel: &str) {
+        self.adaptor.keep_in_plane(channel);
+    }
+
     /// The steering of the step that follows.
     #[must_use]
     pub fn asked(&self) -> &Asked {

@@ -6,6 +6,7 @@ use std::{
         Arc, Condvar, Mutex,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
 use tombolo_pipelines::{
@@ -17,7 +18,7 @@ use super::{
     Source,
     room::{Reservation, Room, is_urgent},
 };
-use crate::lock::{lock, wait};
+use crate::lock::lock;
 
 /// A command that was read, found valid and written to the journal.
 #[derive(Debug)]
@@ -136,11 +137,10 @@ impl Queue {
         lock(&self.waiting).iter().for_each(look);
     }
 
-    /// Returns once there was a call.
-    pub(crate) fn wait(&self) {
-        let mut waiting = lock(&self.waiting);
-        while !self.has_called() {
-            waiting = wait(&self.arrived, waiting);
-        }
+    /// Waits for a call, `patience` at most; says whether there was one.
+    pub(crate) fn wait(&self, patience: Duration) -> bool {
+        let waiting = lock(&self.waiting);
+        drop(self.arrived.wait_timeout_while(waiting, patience, |_| !self.has_called()));
+        self.has_called()
     }
 }

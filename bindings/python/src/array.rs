@@ -136,12 +136,30 @@ fn shown(shape: &[usize]) -> String {
     }
 }
 
+/// Refuses an array that says of some of its numbers that they are none.
+fn require_unmasked(array: &Bound<'_, PyUntypedArray>, what: &str) -> Result<(), RunError> {
+    // Only a class of its own has a mask.
+    if array.is_exact_instance_of::<PyUntypedArray>() {
+        return Ok(());
+    }
+    static IS_MASKED: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let is_masked = IS_MASKED
+        .import(array.py(), "numpy.ma", "is_masked")
+        .and_then(|is_masked| is_masked.call1((array,))?.is_truthy());
+    match is_masked {
+        Ok(false) => Ok(()),
+        Ok(true) => Err(argument(what, "an array of which values are masked", "a value for each")),
+        Err(error) => Err(argument(what, error, "an array of numbers")),
+    }
+}
+
 /// What was given as an array: itself where it is one, else what `numpy.asarray` makes of it.
 pub(crate) fn as_array<'py>(
     given: &Bound<'py, PyAny>,
     what: &str,
 ) -> Result<Bound<'py, PyUntypedArray>, RunError> {
     if let Ok(array) = given.cast::<PyUntypedArray>() {
+        require_unmasked(array, what)?;
         return Ok(array.clone());
     }
     static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();

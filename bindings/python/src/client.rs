@@ -149,7 +149,6 @@ impl Client {
             Event::Lost { reason } => {
                 return Ok(Some(("lost", reason.into_pyobject(py)?.into_any())));
             }
-            Event::Taken { id } => return Ok(Some(("taken", id.into_pyobject(py)?.into_any()))),
             Event::Hello(_) => "hello",
             Event::Status(_) => "status",
             Event::Order(_) => "order",

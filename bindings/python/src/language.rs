@@ -26,6 +26,10 @@ pub(crate) fn order(text: &str, name: &str) -> PyResult<Order> {
         Content::Order(order) => Ok(*order),
         Content::Edits(edits) => Ok(Change::Edits(edits).into()),
         Content::Configuration(_) => Err(wrong("a configuration")),
+        // As one of edits and as one of orders an empty list looks alike.
+        Content::Orders(commands) if commands.is_empty() && text.trim_start().starts_with('[') => {
+            Err(ConfigurationError::new_err(format!("{name}: expected at least one edit")))
+        }
         Content::Orders(commands) => match <[_; 1]>::try_from(commands) {
             Ok([TimedCommand { at: None, command: Command::Order(order), .. }]) => Ok(order),
             _ => Err(wrong("commands of a file of orders")),

@@ -38,6 +38,24 @@ pub(crate) struct Run {
     process: u32,
     links: [Option<String>; 2],
     stopper: Stopper,
+    /// What a handler of a signal has raised while the solver waited.
+    raised: Raised,
+}
+
+type Raised = Arc<Mutex<Option<PyErr>>>;
+
+/// Has the handlers of signals run while the solver waits: Python runs them between its own calls
+/// alone. What one raises stops the run, and is raised behind the call.
+fn heed_signals(run: &mut foreign::Run) -> Raised {
+    let (raised, stopper) = (Raised::default(), run.stopper());
+    let told = Arc::clone(&raised);
+    run.while_waiting(move || {
+        if let Err(error) = Python::attach(|py| py.check_signals()) {
+            *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            stopper.stop();
+        }
+    });
+    raised
 }
 
 /// Moves what only this call uses to where other threads of Python may run meanwhile.
@@ -161,10 +179,12 @@ impl Run {
                 ..settings
             })
         };
-        let run = guarded(|| py.detach(begin).map_err(of_run))?;
+        let mut run = guarded(|| py.detach(begin).map_err(of_run))?;
+        let raised = heed_signals(&mut run);
         Ok(Self {
             links: [run.link(), run.watching_link()],
             stopper: run.stopper(),
+            raised,
             process: std::process::id(),
             state: Mutex::new(State {
                 told: run.asked().parameters.clone(),
@@ -189,12 +209,18 @@ impl Run {
         let mut lender = Lender::default();
         let given = lender.channels(channels);
         let dimensions = given.as_ref().map_or_else(|_| Vec::new(), Channels::dimensions);
+        // A motion along the third axis would be lost.
+        let flat = dimensions.iter().filter(|(_, dimension)| *dimension == 2);
+        flat.for_each(|(channel, _)| run.keep_in_plane(channel));
         let step = tombolo::Step { cycle, time, time_step };
         let looked_at = run.looks_at(&step);
         let given = given.map(|channels| Shown { step, looked_at, channels: channels.0 });
         let call = Call { run, given };
         let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run))?;
         drop(lender);
+        if let Some(error) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            return Err(error);
+        }
         if !shown {
             return Err(of_run(ExecuteError::NoChannel { cycle }.into()));
         }

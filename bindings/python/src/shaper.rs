@@ -119,7 +119,7 @@ impl Shaper {
                 let surface = Arc::new(of_mesh(&mesh, angle).map_err(mistake)?);
                 let shaper = tombolo::deform::shape::Shaper::new(&mesh, Arc::clone(&surface))
                     .map_err(mistake)?;
-                let shaper = shaper.with_clock(tombolo::steering::clock);
+                let shaper = shaper.with_clock(tombolo::steering::clock).in_plane(dimension == 2);
                 let cancellation = shaper.cancellation().clone();
                 Ok(Self { shaper: Mutex::new(shaper), mesh, surface, cancellation, dimension })
             })
@@ -162,7 +162,7 @@ impl Shaper {
         serde_json::to_string(&forecast).map_err(mistake)
     }
 
-    /// The displacement of each vertex of the surface.
+    /// The displacement of each vertex of the surface, in three columns as edits have it.
     fn displacement<'py>(
         &self,
         py: Python<'py>,
@@ -180,7 +180,7 @@ impl Shaper {
                 None => Ok(Vec::new()),
             })
         })?;
-        self.columns(py, &moved)
+        table(py, moved.into_flattened(), 3)
     }
 
     /// The quality of the mesh, or of one with other points, as JSON.

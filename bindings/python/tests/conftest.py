@@ -4,6 +4,7 @@ import contextlib
 import importlib.util
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -141,6 +142,46 @@ class Solver:
         assert not self.thread.is_alive()
         if self.error is not None:
             raise self.error
+
+
+class Relay:
+    """Passes bytes on to the run of a link, swallows or refuses them when it is told to, until it is cut."""
+
+    def __init__(self, link):
+        self.port, self.pairs = int(link.split(":")[2].split("/")[0]), []
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.link = link.replace(f":{self.port}/", f":{self.server.getsockname()[1]}/")
+        self.swallows = self.refuses = False
+        threading.Thread(target=self.serve, daemon=True).start()
+
+    def serve(self):
+        while True:
+            try:
+                client = self.server.accept()[0]
+            except OSError:
+                return
+            if self.refuses:
+                client.close()
+                continue
+            other = socket.create_connection(("127.0.0.1", self.port))
+            self.pairs.append((client, other))
+            for one, two in ((client, other), (other, client)):
+                threading.Thread(target=self.copy, args=(one, two), daemon=True).start()
+
+    def copy(self, one, two):
+        try:
+            while block := one.recv(65536):
+                if not self.swallows:
+                    two.sendall(block)
+            two.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass
+
+    def cut(self):
+        pairs, self.pairs = self.pairs, []
+        for one in (one for pair in pairs for one in pair):
+            one.shutdown(socket.SHUT_RDWR)
+            one.close()
 
 
 @pytest.fixture

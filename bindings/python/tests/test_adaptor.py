@@ -3,9 +3,11 @@
 import gc
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
+import time
 import weakref
 
 import numpy as np
@@ -359,3 +361,59 @@ def test_points_of_two_coordinates_come_back_so():
     assert motion.coordinates.shape == (16, 2)
     points[:] = motion.coordinates
     assert points[15, 0] == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize("waits_for_viewer", [False, True])
+@pytest.mark.parametrize("raises", [False, True])
+def test_signals_are_handled_while_a_solver_waits(tmp_path, waits_for_viewer, raises):
+    configuration = {
+        "version": 1,
+        "stream": {"listen": "127.0.0.1:0"},
+        "steering": {"wait_for_viewer": waits_for_viewer},
+    }
+    orders = None if waits_for_viewer else [{"at": {"cycle": 0}, "pause": {}}]
+    adaptor = tombolo.Adaptor(configuration, orders=orders, output=tmp_path)
+
+    def handle(number, frame):
+        if raises:
+            raise InterruptedError("enough")
+        adaptor.stop()
+
+    before = signal.signal(signal.SIGUSR1, handle)
+    # Where it waits, only the signal ends it: the timer stops what does not heed it.
+    signalled = threading.Timer(1.0, os.kill, [os.getpid(), signal.SIGUSR1])
+    overdue = threading.Timer(30.0, adaptor.stop)
+    try:
+        signalled.start()
+        overdue.start()
+        begun = time.monotonic()
+        if raises:
+            with pytest.raises(InterruptedError, match="enough"):
+                adaptor.execute(0, 0.0, 0.1, {"solid": mesh()})
+        else:
+            assert adaptor.execute(0, 0.0, 0.1, {"solid": mesh()}).stop
+        assert time.monotonic() - begun < 20
+        assert adaptor.execute(1, 0.1, 0.1, {"solid": mesh()}).stop
+    finally:
+        overdue.cancel()
+        signalled.join()
+        signal.signal(signal.SIGUSR1, before)
+        adaptor.finalize()
+
+
+def test_masked_values_are_refused():
+    temperature = np.ma.masked_array(np.arange(27.0))
+    shown = mesh(fields={"temperature": temperature})
+    # A mask that hides nothing is none.
+    assert _native.lent(shown)
+    temperature[3] = np.ma.masked
+    masked = np.ma.masked_array(POINTS, mask=POINTS > 0.9)
+    separate = [np.ma.masked_array(axis, mask=axis > 0.9) for axis in POINTS.T]
+    for given, what in (
+        (shown, "field 'temperature'"),
+        (mesh(masked), "points"),
+        (mesh(separate), "points, component 0"),
+        (mesh(vertex_features=np.ma.masked_equal(np.arange(27), 5)), "vertex_features"),
+    ):
+        with pytest.raises(tombolo.MeshError, match=f"{what}.* masked"):
+            _native.lent(given)

@@ -4,7 +4,7 @@ import time
 
 import pytest
 import tombolo
-from conftest import SQUEEZE, wait
+from conftest import SQUEEZE, Relay, wait
 from tombolo import background
 from tombolo.background import Requests, connection
 
@@ -36,6 +36,28 @@ def test_why_there_is_no_run_is_told_and_it_is_tried_again(solver, tmp_path, mon
     assert connection(str(file)) is known
     assert wait(lambda: known.run).status.cycle >= 0
     assert known.failure is None
+
+
+def test_a_surface_that_did_not_come_is_asked_for_again(solver, monkeypatch):
+    relay = Relay(solver.link)
+    # What is watched stays connected; what is asked for is a connection of its own.
+    connect = background.connect
+
+    def connect_alone(link):
+        run = connect(link)
+        relay.refuses = True
+        return run
+
+    monkeypatch.setattr(background, "connect", connect_alone)
+    known = connection(relay.link)
+    wait(lambda: known.failure)
+    run = known.run
+    assert run.connected and known.surface is None
+    relay.refuses = False
+    monkeypatch.setattr(background.clock, "monotonic", lambda now=time.monotonic: now() + 10)
+    assert wait(lambda: connection(relay.link).surface).names == ["top", "bottom", "untagged"]
+    assert known.run is run and known.failure is None
+    relay.server.close()
 
 
 def test_another_run_behind_the_same_file_is_found_once_the_first_has_ended(begin, tmp_path, monkeypatch):

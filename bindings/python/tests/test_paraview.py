@@ -173,6 +173,42 @@ def test_each_filter_moves_the_surface_in_plain_vtk(plugin, solver, tmp_path):
     assert "no node that can be dragged" in plugin.errors[-1]
 
 
+def test_an_edit_adds_to_what_no_list_of_edits_stands_for_in_plain_vtk(plugin, solver):
+    from tombolo import vtk
+
+    source = plugin.make("TomboloSurface", Link=solver.link)
+    newest(source)
+    ends = {"Features": "top", "Fixed": "bottom"}
+    first = plugin.make("TomboloTranslate", source, By=[0.1, 0, 0], **ends)
+    second = plugin.make("TomboloTranslate", source, By=[0, 0.2, 0], **ends)
+    both = plugin.make("TomboloCombine", first, second)
+    by_angle = plugin.make("TomboloFeaturesByAngle", first, Angle=40)
+    connected = tombolo.background.connection(solver.link)
+    reference = connected.surface
+    on_top = reference.points[:, 2] == 1
+    last = plugin.make("TomboloTranslate", both, By=[0, 0, 0.3], **ends)
+    data = shown(last)
+    moved = vtk.array(data.GetPointData(), "displacement")
+    np.testing.assert_allclose(moved[on_top], np.tile([0.1, 0.2, 0.3], (on_top.sum(), 1)), atol=1e-12)
+    # The run makes the same of the order.
+    order = plugin.make("TomboloOrder", last)
+    order.Update()
+    edits = order.edits(connected)
+    assert [next(iter(edit)) for edit in edits] == ["displacement", "translate"]
+    shaper, _ = expected_of(solver)
+    assert np.array_equal(shaper.displacement(edits), moved)
+
+    before = vtk.array(shown(by_angle).GetPointData(), "displacement")
+    numbers = vtk.array(shown(by_angle).GetCellData(), "features")
+    names = vtk.texts(shown(by_angle), "feature_names")
+    triangles = reference.points[reference.connectivity.reshape(-1, 3)]
+    top, bottom = (names[numbers[np.all(triangles[:, :, 2] == z, axis=1)][0]] for z in (1, 0))
+    last = plugin.make("TomboloTranslate", by_angle, Features=top, Fixed=bottom, By=[0, 0, 0.3])
+    moved = vtk.array(shown(last).GetPointData(), "displacement")
+    np.testing.assert_allclose(moved[on_top], before[on_top] + [0, 0, 0.3], atol=1e-12)
+    assert plugin.errors == []
+
+
 def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
     from tombolo import vtk
 

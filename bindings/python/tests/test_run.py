@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import tombolo
-from conftest import SQUEEZE, wait
+from conftest import SQUEEZE, Relay, wait
 from tombolo.state import State
 
 
@@ -347,45 +347,9 @@ def test_nobody_waits_for_a_reader_that_has_failed(solver, monkeypatch):
             run.wait_for(lambda: False, 30)
 
 
-class Relay:
-    """Passes bytes on to a server until it is cut."""
-
-    def __init__(self, port):
-        self.port, self.pairs = port, []
-        self.server = socket.create_server(("127.0.0.1", 0))
-        threading.Thread(target=self.serve, daemon=True).start()
-
-    def serve(self):
-        while True:
-            try:
-                client = self.server.accept()[0]
-            except OSError:
-                return
-            other = socket.create_connection(("127.0.0.1", self.port))
-            self.pairs.append((client, other))
-            for one, two in ((client, other), (other, client)):
-                threading.Thread(target=self.copy, args=(one, two), daemon=True).start()
-
-    @staticmethod
-    def copy(one, two):
-        try:
-            while block := one.recv(65536):
-                two.sendall(block)
-        except OSError:
-            pass
-
-    def cut(self):
-        pairs, self.pairs = self.pairs, []
-        for one in (one for pair in pairs for one in pair):
-            one.shutdown(socket.SHUT_RDWR)
-            one.close()
-
-
 def test_a_lost_connection_is_made_again(solver):
-    port = int(solver.link.split(":")[2].split("/")[0])
-    relay = Relay(port)
-    link = solver.link.replace(f":{port}/", f":{relay.server.getsockname()[1]}/")
-    with tombolo.connect(link) as run:
+    relay = Relay(solver.link)
+    with tombolo.connect(relay.link) as run:
         run.wait_for(lambda: run.features, 30)
         run.drive()
         lost = run.events("lost", timeout=30)
@@ -396,42 +360,6 @@ def test_a_lost_connection_is_made_again(solver):
         view = run.wait_for_view("midplane", timeout=30)
         run.wait_for_view("midplane", after=view.cycle, timeout=30)
     relay.server.close()
-
-
-def test_a_run_in_async(solver, run):
-    async def work():
-        aio = run.aio
-        await aio.wait_for(lambda: run.features, 30)
-        forecast, status = await asyncio.gather(aio.forecast(SQUEEZE, timeout=60), aio.wait_for_cycle(3, 30))
-        assert forecast.outcome == "applied" and status.cycle >= 3
-        order = await aio.order(SQUEEZE)
-        await order.wait(60)
-        assert order.status == "applied"
-        await aio.set("heating", 2, timeout=30)
-        with pytest.raises(tombolo.WaitError):
-            await aio.wait_for(lambda: False, 0.2)
-        task = asyncio.create_task(aio.wait_for(lambda: False))
-        await asyncio.sleep(0.05)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        async for event in aio.events("monitor"):
-            assert event.data["pipeline"] == "health"
-            break
-        assert await aio.stack() == run.stack and await aio.pipelines() == run.pipelines
-        cut = {"name": "cut", "stages": [{"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}
-        await aio.change_pipelines({"set": [cut]}, timeout=30)
-        assert (await aio.wait_for_view("cut", timeout=30)).name == "cut"
-        with pytest.raises(KeyError, match="cut"):
-            await aio.wait_for_view("cub", timeout=1)
-        # What is told from this call on comes, whenever it is first asked for.
-        events = aio.events("order")
-        await (await aio.undo()).wait(60)
-        assert (await events.__anext__()).data["status"] == "accepted"
-        await aio.close()
-        assert [event async for event in events] == []
-
-    asyncio.run(work())
 
 
 def test_ctrl_c_ends_a_wait(solver):
@@ -505,3 +433,12 @@ def test_a_slow_reader_is_shown_the_newest_frame_and_not_each_one(begin):
             cycles.append(next(frames).data.cycle)
         # Some were under way, and 64 are kept of those that came.
         assert len(cycles) < 150
+
+
+def test_a_command_is_done_once_the_solver_has_it(begin):
+    running = begin(step=3.0)
+    with tombolo.connect(running.link) as run:
+        run.drive()
+        command = run.set("heating", 7, timeout=60)
+        assert command.cycle is not None
+        wait(lambda: 7 in running.heating)

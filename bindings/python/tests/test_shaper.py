@@ -182,6 +182,9 @@ def test_what_would_break_the_mesh_is_rejected_and_forecast():
         shaper.shape([{"translat": {}}])
     with pytest.raises(tombolo.ConfigurationError, match="undo"):
         shaper.shape({"undo": 1})
+    for nothing in ([], {"edits": []}):
+        with pytest.raises(tombolo.ConfigurationError, match="expected at least one edit"):
+            shaper.shape(nothing)
     with pytest.raises(tombolo.TomboloError, match="top"):
         shaper.displacement([{"translate": {"features": ["tpo"], "by": [0, 0, 1]}}])
 
@@ -195,6 +198,9 @@ def test_what_is_no_mesh_is_told():
     ):
         with pytest.raises(tombolo.MeshError, match=text):
             tombolo.Shaper(*given)
+    for given in (tombolo.Mesh(POINTS, {"tetra": TETS}), meshio.Mesh(POINTS, [("tetra", TETS)])):
+        with pytest.raises(tombolo.MeshError, match="faces: found them without cells"):
+            tombolo.Shaper(given, faces=FACES)
     shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
     with pytest.raises(tombolo.MeshError, match="one for each vertex"):
         shaper.quality(POINTS[:-1])
@@ -230,3 +236,39 @@ def test_long_work_tells_how_long_and_is_given_up():
         thread.join()
     # It can be used again.
     assert shaper.displacement(SQUEEZE).shape == shaper.surface.points.shape
+
+
+def plate():
+    """The unit square as quadrangles, in two coordinates, and its two halves."""
+    axis = np.linspace(0, 1, 5)
+    points = np.stack(np.meshgrid(axis, axis, indexing="ij"), -1).reshape(-1, 2)
+    numbers = np.arange(25).reshape(5, 5)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], -1).reshape(-1, 4)
+    is_left = points[quads, 0].mean(1) < 0.5
+    return points, {"quad": quads}, {"left": quads[is_left], "right": quads[~is_left]}
+
+
+def test_a_mesh_of_two_coordinates_stays_in_its_plane():
+    shaper = tombolo.Shaper(*plate())
+    inside = [{"translate": {"features": ["left"], "by": [0.1, 0, 0]}}]
+    shape = shaper.shape(inside)
+    assert shape.points.shape == (25, 2)
+    moved = shaper.displacement(inside)
+    assert moved.shape == shaper.surface.points.shape
+    again = [{"displacement": {"vertices": shaper.surface.vertices, "values": moved}}]
+    assert np.array_equal(shaper.displacement(again), moved)
+    assert np.array_equal(shaper.shape(again).points, shape.points)
+    outside = [{"translate": {"features": ["left"], "by": [0.1, 0, 0.3]}}]
+    with pytest.raises(tombolo.RejectedError, match="along z, expected 0"):
+        shaper.shape(outside)
+    assert "along z" in shaper.forecast(outside).reason
+    # A motion out of the plane would be lost on the way to the solver.
+    points, cells, faces = plate()
+    orders = [{"at": {"cycle": 1}, "order": {"edits": edits}} for edits in (outside, inside)]
+    with tombolo.Adaptor({"version": 1}, orders=orders) as adaptor:
+        for cycle in range(4):
+            steering = adaptor.execute(cycle, 0.1 * cycle, 0.1, tombolo.Mesh(points, cells, faces=faces))
+            if steering.motion is not None:
+                points[:] = steering.motion.coordinates
+    assert [order["status"] for order in adaptor.report["orders"]] == ["rejected", "applied"]
+    assert "along z" in adaptor.report["orders"][0]["reason"]

@@ -185,3 +185,23 @@ def test_a_shaper_is_made_once_for_each_mesh(monkeypatch):
     assert vtk.shaper(vtk.of_surface(shaper.surface)) is not first
     renamed = shaper.surface._replace(names=["a", "b", "c"])
     assert [it["name"] for it in vtk.shaper(vtk.of_surface(renamed)).features] == ["a", "b", "c"]
+
+
+def test_features_of_pixels_and_strips_are_kept():
+    points = np.array([[x, y, 0] for y in range(3) for x in range(4)], float)
+
+    def features(*cells):
+        made = vtkUnstructuredGrid()
+        made.SetPoints(vtk._points(points))
+        for kind, corners, _ in cells:
+            made.InsertNextCell(kind, len(corners), corners)
+        vtk.add(made.GetCellData(), "features", np.array([number for *_, number in cells], np.int32))
+        return features_of(made)
+
+    pixels = features((8, (0, 1, 4, 5), 3), (8, (1, 2, 5, 6), 3), (8, (4, 5, 8, 9), 1))
+    assert pixels == features((9, (0, 1, 5, 4), 3), (9, (1, 2, 6, 5), 3), (9, (4, 5, 9, 8), 1))
+    assert [name for name, *_ in pixels] == ["feature-1", "feature-3"]
+    strips = features((6, (0, 4, 1, 5, 2, 6), 3), (6, (4, 8, 5, 9), 1))
+    triangles = [(0, 4, 1), (1, 4, 5), (1, 5, 2), (2, 5, 6)]
+    assert strips == features(*((5, it, 3) for it in triangles), (5, (4, 8, 5), 1), (5, (5, 8, 9), 1))
+    assert [name for name, *_ in strips] == ["feature-1", "feature-3"]

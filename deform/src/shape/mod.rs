@@ -159,6 +159,8 @@ pub struct Shaper {
     mended: Vec<Mended>,
     spent: ShapeSeconds,
     clock: fn() -> f64,
+    /// Whether vertices may move along x and y alone.
+    in_plane: bool,
 }
 
 impl Shaper {
@@ -218,6 +220,7 @@ impl Shaper {
             mended: Vec::new(),
             spent: ShapeSeconds::default(),
             clock: no_clock,
+            in_plane: false,
         })
     }
 
@@ -239,6 +242,13 @@ impl Shaper {
     #[must_use]
     pub fn with_clock(self, clock: fn() -> f64) -> Self {
         Self { clock, ..self }
+    }
+
+    /// The shaper of a mesh whose vertices have two coordinates for whoever gets its shapes: edits that
+    /// move any along z are refused. Rank 0, which has the surface, says so for all.
+    #[must_use]
+    pub fn in_plane(self, in_plane: bool) -> Self {
+        Self { in_plane, ..self }
     }
 
     /// By which another thread has a plan under way given up: it is refused with
@@ -348,7 +358,11 @@ impl Shaper {
         let mut seconds = ShapeSeconds::default();
         let watch = self.stopwatch();
         let body = Arc::clone(&self.body);
+        let in_plane = self.in_plane;
         let displaced = displaced(self.editor.as_mut(), stack).and_then(|displacement| {
+            if let (Some(surface), true) = (body.surface(), in_plane) {
+                require_plane(surface.points(), &displacement)?;
+            }
             // Where a part of the surface is let go, it is looked at where it ends.
             if let (Some(surface), false, SurfaceRule::Reject) =
                 (body.surface(), deform.lets_go(), rule)
@@ -432,6 +446,22 @@ impl Shaper {
 /// The displacement of the surface that a stack makes, where the surface is.
 fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>, Refused> {
     editor.map_or_else(|| Ok(Vec::new()), |editor| Ok(editor.displacement(stack)?))
+}
+
+/// What is out of the plane by less than this part of the largest displacement is rounding.
+const OUT_OF_PLANE: f64 = 1e-9;
+
+fn require_plane(points: &[Vector], displacement: &[Vector]) -> Result<(), Refused> {
+    let largest =
+        displacement.as_flattened().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let farthest =
+        points.iter().zip(displacement).max_by(|(_, a), (_, b)| a[2].abs().total_cmp(&b[2].abs()));
+    match farthest {
+        Some((&at, by)) if by[2].abs() > OUT_OF_PLANE * largest => {
+            Err(Refused::LeavesPlane { at, by: by[2] })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Adding 0 would turn a coordinate of -0 into 0: what does not move keeps its bits.

@@ -81,6 +81,18 @@ pub enum Refused {
     /// The parts of the ranks make no mesh.
     #[error(transparent)]
     Distributed(#[from] DistributedError),
+    /// The edits move a vertex out of the plane of a mesh of two coordinates:
+    /// [`Shaper::in_plane`](super::Shaper::in_plane).
+    #[error(
+        "the edits move the vertex at ({}, {}) by {by} along z, expected 0: the vertices of this mesh have two coordinates",
+        at[0], at[1]
+    )]
+    LeavesPlane {
+        /// The vertex.
+        at: Vector,
+        /// How far, in units of the mesh.
+        by: f64,
+    },
     /// There are more edits or shapes than are allowed.
     #[error(transparent)]
     Limit(#[from] Exceeded),
@@ -171,6 +183,7 @@ impl Refused {
                 path.worst.first().map(|worst| worst.centroid).or(path.folded_at)
             }
             Refused::Surface(broken) => broken.report.place(),
+            Refused::LeavesPlane { at, .. } => Some(*at),
             Refused::Elsewhere(elsewhere) => elsewhere.place,
             _ => None,
         }

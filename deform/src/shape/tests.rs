@@ -488,3 +488,24 @@ fn a_solve_that_fails_on_several_ranks_says_how_far_the_order_can_go() {
         );
     }
 }
+
+#[test]
+fn a_mesh_of_two_coordinates_stays_in_its_plane() {
+    let mesh = crate::shapes::plate([4, 4], [0.0; 2], [1.0; 2]);
+    let mut shaper = alone(&mesh).in_plane(true);
+    let by = |by: [f64; 3]| {
+        let region = json!({"box": {"lower": [-1, -1, -1], "upper": [0.5, 2, 1]}});
+        stack(json!([{"translate": {"region": region, "by": by}}]))
+    };
+    let deformation = Deformation::default();
+    let inside = asked(&shaper, &by([0.1, 0.0, 0.0]), &deformation);
+    assert!(shaper.plan(&inside).unwrap().end().iter().all(|point| point[2] == 0.0));
+    let outside = asked(&shaper, &by([0.1, 0.0, 0.3]), &deformation);
+    let refused = shaper.plan(&outside).unwrap_err();
+    assert!(refused.place().is_some());
+    let Refused::LeavesPlane { by: distance, .. } = refused else { panic!("{refused}") };
+    assert!((distance - 0.3).abs() < 1e-9, "{distance}");
+    let forecast = shaper.forecast(&outside);
+    assert!(forecast.reason.is_some_and(|reason| reason.contains("along z, expected 0")));
+    assert!(alone(&mesh).plan(&outside).is_ok());
+}

@@ -28,7 +28,9 @@ const NAMES: [&str; 14] = [
 const WHEEL: Duration = Duration::from_secs(8);
 /// How long a run may take to answer what its server answers at once, with time to connect again.
 pub(crate) const ANSWER: Duration = Duration::from_secs(120);
-/// Said of a command that the run has taken and the solver has not come to.
+/// How long a solver that computes is waited for at once.
+const WAIT: Duration = Duration::from_secs(3600);
+/// Said of an order that the run has taken and the solver has not come to.
 const NOT_YET: &str = "taken: it takes effect at the solver's next safe point";
 /// Bytes that are read of a file that holds a link.
 const LINK_FILE: u64 = 1 << 16;

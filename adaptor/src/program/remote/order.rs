@@ -19,13 +19,11 @@ use crate::{
 };
 use clap::Args;
 
-use super::{ANSWER, NOT_YET, Target, failed, refused, steer};
+use super::{ANSWER, NOT_YET, Target, WAIT, failed, refused, steer};
 use crate::program::{Failure, read, say};
 
 /// How long the bar is, in characters.
 const BAR: usize = 30;
-/// How long a solver that computes is waited for at once.
-const WAIT: Duration = Duration::from_secs(3600);
 
 #[derive(Debug, Args)]
 pub(crate) struct Options {
@@ -140,6 +138,10 @@ fn read_order(file: &Path) -> Result<Order, Failure> {
         Content::Order(order) => Ok(*order),
         Content::Edits(edits) => Ok(Change::Edits(edits).into()),
         Content::Configuration(_) => Err(wrong("a configuration")),
+        // As one of edits and as one of orders an empty list looks alike.
+        Content::Orders(commands) if commands.is_empty() && text.trim_start().starts_with('[') => {
+            Err(Failure::NoConnection(format!("{name}: expected at least one edit")))
+        }
         Content::Orders(commands) => match <[_; 1]>::try_from(commands) {
             Ok([language::TimedCommand { at: None, command: Command::Order(order), .. }]) => {
                 Ok(order)

@@ -7,7 +7,7 @@ use crate::{
 use clap::Args;
 use serde_json::json;
 
-use super::{ANSWER, NOT_YET, Target, failed, refused, steer};
+use super::{Target, WAIT, failed, refused, steer};
 use crate::program::{Failure, say};
 
 #[derive(Debug, Args)]
@@ -55,33 +55,29 @@ pub(crate) fn cancel(options: &CancelOptions) -> Result<(), Failure> {
     give(&options.target, &Command::Cancel(cancel), "cancelled")
 }
 
-/// Sends a command and waits until it has taken effect, as far as the run tells.
+/// Sends a command and waits until it has taken effect.
 fn give(target: &Target, command: &Command, done: &str) -> Result<(), Failure> {
     let client = steer(target)?;
     let id = client.send(command).map_err(failed)?;
-    let tell = |cycle: Option<u64>, is_seen: bool| match (target.json, is_seen) {
-        (true, _) => say(json!({"done": {"id": id, "cycle": cycle, "seen": is_seen}})),
-        (_, true) => {
-            say(cycle.map_or_else(|| done.into(), |cycle| format!("{done} at cycle {cycle}")))
-        }
-        _ => say(NOT_YET),
+    let tell = |cycle: Option<u64>| match target.json {
+        true => say(json!({"done": {"id": id, "cycle": cycle}})),
+        false => say(cycle.map_or_else(|| done.into(), |cycle| format!("{done} at cycle {cycle}"))),
     };
     loop {
         if let Some(cycle) = seen(&client, command) {
-            return tell(Some(cycle), true);
+            return tell(Some(cycle));
         }
-        let told = match client.next(ANSWER) {
+        let told = match client.next(WAIT) {
             Ok(Some(told)) => told,
             Ok(None) => return Err(Failure::Wrong("the run tells nothing".into())),
             // It ended before it told that it would.
             Err(ClientError::Closed) if matches!(command, Command::Stop {}) => {
-                return tell(client.end().map(|end| end.cycle), true);
+                return tell(client.end().map(|end| end.cycle));
             }
             Err(error) => return Err(failed(error)),
         };
         match &told.event {
-            Event::Done(done) if done.id == id => return tell(done.cycle, true),
-            Event::Taken { id: taken } if *taken == id => return tell(None, false),
+            Event::Done(done) if done.id == id => return tell(done.cycle),
             event => refused(event, &id)?,
         }
     }

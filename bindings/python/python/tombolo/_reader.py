@@ -71,11 +71,9 @@ class Reader:
                 self.changed.notify_all()
 
     def _take(self, kind: str, payload: Any) -> None:
-        data = _json.loads(payload) if isinstance(payload, str) and kind not in ("lost", "taken") else payload
+        data = _json.loads(payload) if isinstance(payload, str) and kind != "lost" else payload
         with self.changed:
-            event = self._state.take(kind, data)
-            if event is not None:
-                self._tell(event)
+            self._tell(self._state.take(kind, data))
             self.changed.notify_all()
 
     def _tell(self, event: Event) -> None:

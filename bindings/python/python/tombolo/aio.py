@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import time as clock
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
+from . import _json
 from .errors import CallError, WaitError
 from .orders import Command, Edits, Forecast, Order
+from .run import _text
 
 if TYPE_CHECKING:
+    from . import _native
+    from ._reader import Reader
     from .events import Event
     from .run import Run
     from .state import Status
@@ -60,6 +65,30 @@ class AsyncOrder:
         return repr(self.order)
 
 
+class _Events(AsyncIterator["Event"]):
+    """What a run tells. No generator, which the cancellation of one wait for an event would end for good."""
+
+    def __init__(self, reader: Reader, kinds: tuple[str, ...]) -> None:
+        self._reader, self._kinds = reader, kinds
+        self._waiting: deque[Event] = reader.listen()
+        self._is_over = False
+
+    async def __anext__(self) -> Event:
+        while not self._is_over:
+            # The thread only waits: of one that was cancelled the event would be lost.
+            try:
+                await _in_slices(lambda left: self._reader.wait_for(lambda: len(self._waiting) > 0, left), None)
+            except CallError:
+                break
+            if self._waiting:
+                event = self._waiting.popleft()
+                self._is_over = event.kind == "ended"
+                if not self._kinds or event.kind in self._kinds:
+                    return event
+        self._is_over = True
+        raise StopAsyncIteration
+
+
 class AsyncRun:
     """A `Run` whose methods that wait are coroutines: `run.aio`. What is only looked at is read from the run itself.
 
@@ -83,52 +112,64 @@ class AsyncRun:
         self.run = run
 
     async def order(self, edits: Edits, **settings: Any) -> AsyncOrder:
-        """As `Run.order`."""
-        return AsyncOrder(await asyncio.to_thread(lambda: self.run.order(edits, **settings)))
+        """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
+        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(text, name))))
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
-        return AsyncOrder(await asyncio.to_thread(self.run.undo, count))
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(count))))
 
     async def forecast(self, edits: Edits, *, timeout: Optional[float] = None, **settings: Any) -> Forecast:
         """As `Run.forecast`."""
-        return await asyncio.to_thread(lambda: self.run.forecast(edits, timeout=timeout, **settings))
+        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        question = await self._send(lambda client: client.forecast(text, name))
+        return await _in_slices(lambda left: self.run._foretold(question, left), timeout)
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
         """As `Run.link_for`."""
         return await asyncio.to_thread(lambda: self.run.link_for(rights, timeout))
 
-    async def _give(self, give: Callable[[], Command], timeout: Optional[float]) -> Command:
-        command = await asyncio.to_thread(give)
+    async def _send(self, send: Callable[[_native.Client], str]) -> str:
+        """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
+        await self.drive()
+        return await asyncio.to_thread(lambda: send(self.run._reader.client))
+
+    async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
+        command = Command(self.run, await self._send(send), task)
         return await _in_slices(command.wait, timeout)
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
-        return await self._give(lambda: self.run.set(parameter, value, wait=False), timeout)
+        return await self._give(lambda client: client.set(parameter, float(value)), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.pause`."""
-        return await self._give(lambda: self.run.pause(wait=False), timeout)
+        return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.resume`."""
-        return await self._give(lambda: self.run.resume(wait=False), timeout)
+        return await self._give(lambda client: client.resume(), "resume", timeout)
 
     async def stop(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.stop`."""
-        return await self._give(lambda: self.run.stop(wait=False), timeout)
+        return await self._give(lambda client: client.stop(), "stop", timeout)
 
     async def cancel(self, order: Union[Order, str], *, timeout: Optional[float] = None) -> Command:
         """As `Run.cancel`."""
-        return await self._give(lambda: self.run.cancel(order, wait=False), timeout)
+        identity = order.id if isinstance(order, Order) else order
+        return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
 
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
         """As `Run.change_pipelines`."""
-        return await self._give(lambda: self.run.change_pipelines(change, wait=False), timeout)
+        text = _json.text(change, "pipelines")
+        return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
     async def drive(self, timeout: float = 8.0) -> None:
         """As `Run.drive`."""
-        await asyncio.to_thread(self.run.drive, timeout)
+        until = clock.monotonic() + timeout
+        while not await asyncio.to_thread(self.run._ask_for_wheel, until):
+            pass
 
     async def surface(self) -> Surface:
         """As `Run.surface`."""
@@ -160,19 +201,8 @@ class AsyncRun:
         return await _in_slices(self.run.wait, timeout)
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
-        """As `Run.events`, for `async for`."""
-        return self._events(self.run._reader.listen(), kinds)
-
-    async def _events(self, waiting: deque[Event], kinds: tuple[str, ...]) -> AsyncIterator[Event]:
-        while True:
-            try:
-                event = await _in_slices(lambda left: self.run._reader.next(waiting, left), None)
-            except CallError:
-                return
-            if not kinds or event.kind in kinds:
-                yield event
-            if event.kind == "ended":
-                return
+        """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
+        return _Events(self.run._reader, kinds)
 
     async def close(self) -> None:
         """As `Run.close`."""

@@ -25,7 +25,7 @@ class Connection:
     """A run that a thread of its own connects to. What is not there yet is None.
 
     Once the run has ended it is looked for again: another one may be under way behind the same link, such as a file.
-    Until then all stays as it was.
+    Until then all stays as it was. A surface that did not come is asked for again as well.
 
     Attributes
     ----------
@@ -52,20 +52,22 @@ class Connection:
         """Try, unless it is being tried, is there or was tried just now."""
         is_trying = self._thread is not None and self._thread.is_alive()
         is_there = self.run is not None and self.run.connected
-        if not is_there and not is_trying and clock.monotonic() >= self._again:
+        if not (is_there and self.surface is not None) and not is_trying and clock.monotonic() >= self._again:
             self._again = clock.monotonic() + _AGAIN
             self._thread = threading.Thread(target=self._connect, name="tombolo-connection", daemon=True)
             self._thread.start()
 
     def _connect(self) -> None:
         try:
-            run, before = connect(self.link), self.run
-            self.run, self.surface, self.failure = run, None, None
-            if before is not None:
-                before.close()
+            run = self.run
+            if run is None or not run.connected:
+                before, run = run, connect(self.link)
+                self.run, self.surface, self.failure = run, None, None
+                if before is not None:
+                    before.close()
             # Before the first step there is no mesh.
             run.wait_for(lambda: run.features, None)
-            self.surface = run.surface
+            self.surface, self.failure = run.surface, None
         except TomboloError as error:
             self.failure, self._again = str(error), clock.monotonic() + _AGAIN
 

@@ -55,7 +55,8 @@ class Mesh:
     Parameters
     ----------
     points : array of shape (n, 2) or (n, 3)
-        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis.
+        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis. With two of them,
+        orders that would move a vertex along the third axis are rejected.
     cells : dict, optional
         From cell types to vertex numbers, counted from 0, a row for each cell: ``{"tetra": tets}`` with an array
         `(m, 4)`. Types are called `vertex`, `line`, `triangle`, `quad`, `tetra`, `hexahedron`, `wedge`, `pyramid`, ...
@@ -81,7 +82,8 @@ class Mesh:
     -----
     Arrays of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first, with strides,
     read-only. Cells of one type are borrowed where their array is contiguous. Anything else, such as another byte
-    order, negative strides or float16, is copied once it is looked at or is an error that says so.
+    order, negative strides or float16, is copied once it is looked at or is an error that says so. An array of
+    `numpy.ma` of which values are masked is an error.
 
     Examples
     --------

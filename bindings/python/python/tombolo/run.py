@@ -60,17 +60,24 @@ class Run(Watched):
         NotDriverError
             Somebody else steers, or this client may only watch.
         """
+        until = clock.monotonic() + timeout
+        while not self._ask_for_wheel(until):
+            pass
+
+    def _ask_for_wheel(self, until: float) -> bool:
+        """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then."""
         self._reader.check()
         if self._watch:
             raise NotDriverError("this client only watches: it was connected with watch=True")
-        until = clock.monotonic() + timeout
-        while not self.drives:
-            try:
-                in_thread(lambda: self._reader.client.drive(_SLICE))
-            except NotDriverError:
-                taken = self._state.status is not None and self._state.status.driver is not None
-                if taken or clock.monotonic() >= until:
-                    raise
+        if self.drives:
+            return True
+        try:
+            in_thread(lambda: self._reader.client.drive(_SLICE))
+        except NotDriverError:
+            taken = self._state.status is not None and self._state.status.driver is not None
+            if taken or clock.monotonic() >= until:
+                raise
+        return self.drives
 
     def order(
         self,
@@ -109,9 +116,7 @@ class Run(Watched):
                               schedule={"steps": 10})
             order.wait()
         """
-        other = replaces.id if isinstance(replaces, Order) else replaces
-        settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other}
-        text, name = _json.order(edits, settings)
+        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
         self.drive()
         return Order(self, in_thread(lambda: self._reader.client.order(text, name)))
 
@@ -125,9 +130,12 @@ class Run(Watched):
         timeout: Optional[float] = None,
     ) -> Forecast:
         """Ask what an order would come to, were it given now; nothing changes. The parameters are those of `order`."""
-        text, name = _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard})
+        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard)
         self.drive()
-        question = in_thread(lambda: self._reader.client.forecast(text, name))
+        return self._foretold(in_thread(lambda: self._reader.client.forecast(text, name)), timeout)
+
+    def _foretold(self, question: str, timeout: Optional[float]) -> Forecast:
+        """Wait for the answer to a forecast that was asked for."""
         kind, data = self.wait_for(lambda: self._state.answers.get(question), timeout) or ("", {})
         if kind == "error":
             raise RejectedError(data["message"])
@@ -241,6 +249,19 @@ class Run(Watched):
         from .jupyter import viewer
 
         return viewer(self.link)
+
+
+def _text(
+    edits: Edits,
+    *,
+    schedule: Optional[Mapping[str, Any]] = None,
+    deform: Optional[Mapping[str, Any]] = None,
+    guard: Optional[Mapping[str, Any]] = None,
+    replaces: Union[Order, str, None] = None,
+) -> tuple[str, str]:
+    """An order as a text with its name."""
+    other = replaces.id if isinstance(replaces, Order) else replaces
+    return _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other})
 
 
 def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: bool = True, attempts: int = 10) -> Run:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
 from ._waiting import in_thread
+from .errors import MeshError
 from .mesh import Cells, Faces, Mesh, faces_of_features
 from .orders import Forecast
 from .views import Surface
@@ -163,6 +164,8 @@ class Shaper:
     ) -> None:
         if cells is not None:
             mesh = Mesh(mesh, cells, faces=faces)
+        elif faces is not None:
+            raise MeshError("faces: found them without cells, expected both or neither: a mesh has its own parts")
         elif not isinstance(mesh, (Mesh, Mapping)):
             if hasattr(mesh, "cells_dict") and hasattr(mesh, "point_sets"):
                 mesh = _of_meshio(mesh)
@@ -225,7 +228,8 @@ class Shaper:
         ConfigurationError
             Something is wrong with the edits, with line, column and path.
         RejectedError
-            The mesh would be broken. The text says where; `report` has the fraction that would pass.
+            The mesh would be broken, or one of two coordinates would leave its plane. The text says where; `report` has
+            the fraction that would pass.
         """
         text, name = _json.order(edits, settings)
         points, told = self._work(lambda: self._shaper.shape(text, name), progress)
@@ -238,7 +242,7 @@ class Shaper:
         return Forecast(_json.loads(self._work(lambda: self._shaper.forecast(text, name), progress)))
 
     def displacement(self, edits: Edits, *, progress: Optional[Progress] = None) -> NDArray[np.float64]:
-        """Find how far edits move each vertex of the surface: a row for each of `surface.points`.
+        """Find how far edits move each vertex of the surface: a row `(x, y, z)` for each of `surface.points`.
 
         An edit ``{"displacement": {"vertices": surface.vertices, "values": ...}}`` takes it again.
         """

@@ -104,14 +104,11 @@ class State:
         self.orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
         self.answers: OrderedDict[str, tuple[str, Any]] = OrderedDict()
 
-    def take(self, kind: str, data: Any) -> Optional[Event]:
-        """Take what the run has told; returns the event that it is, None where it is only for whoever has asked."""
+    def take(self, kind: str, data: Any) -> Event:
+        """Take what the run has told; returns the event that it is."""
         if kind == "frame":
             data = self._view(data)
             self.views[data.name] = data
-        elif kind == "taken":
-            self._answer(data, kind, {})
-            return None
         elif kind != "lost":
             identity = data.get("id")
             is_known = kind != "unknown"

@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 #: VTK's numbers of the faces that features can be of.
-_TRIANGLE, _POLYGON, _QUAD = 5, 7, 9
+_TRIANGLE, _STRIP, _POLYGON, _PIXEL, _QUAD = 5, 6, 7, 8, 9
 #: Shapers that are kept, the last ones used.
 _KEPT = 4
 
@@ -231,17 +231,22 @@ def to_mesh(data: Any) -> Mesh:
 def _faces(
     connectivity: NDArray[Any], offsets: NDArray[Any], types: NDArray[Any], numbers: NDArray[Any]
 ) -> list[tuple[int, NDArray[Any], NDArray[Any]]]:
-    """Triangles and quadrangles with the number of each one's feature; a polygon by triangles that make it up."""
+    """Triangles and quadrangles with the number of each one's feature; other polygons and strips by their triangles."""
     sizes = np.diff(offsets)
-    is_face = np.isin(types, (_TRIANGLE, _QUAD, _POLYGON))
+    is_face = np.isin(types, (_TRIANGLE, _STRIP, _POLYGON, _PIXEL, _QUAD))
     parts: list[tuple[int, NDArray[Any], NDArray[Any]]] = []
-    for size in np.unique(sizes[is_face]):
-        chosen = np.flatnonzero(is_face & (sizes == size))
+    for kind, size in np.unique(np.stack([types, sizes], axis=1)[is_face], axis=0).tolist():
+        chosen = np.flatnonzero((types == kind) & (sizes == size))
         rows = connectivity[offsets[chosen][:, None] + np.arange(size)]
-        if size == 4:
-            parts.append((_QUAD, rows, numbers[chosen]))
-            continue
-        parts += [(_TRIANGLE, rows[:, [0, at, at + 1]], numbers[chosen]) for at in range(1, int(size) - 1)]
+        if kind == _STRIP:
+            # Every other one is turned round.
+            corners = [[at, at + 1, at + 2] if at % 2 == 0 else [at + 1, at, at + 2] for at in range(size - 2)]
+        elif size != 4:
+            corners = [[0, at, at + 1] for at in range(1, size - 1)]
+        else:
+            # The vertices of a pixel count along its axes, and not around it.
+            corners = [[0, 1, 3, 2] if kind == _PIXEL else [0, 1, 2, 3]]
+        parts += [(_QUAD if len(of) == 4 else _TRIANGLE, rows[:, of], numbers[chosen]) for of in corners]
     return parts
 
 

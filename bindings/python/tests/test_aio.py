@@ -1,0 +1,111 @@
+"""A run from outside in `async` programs."""
+
+import asyncio
+import threading
+import time
+
+import pytest
+import tombolo
+from conftest import SQUEEZE, Relay
+
+
+def test_a_run_in_async(solver, run):
+    async def work():
+        aio = run.aio
+        await aio.wait_for(lambda: run.features, 30)
+        forecast, status = await asyncio.gather(aio.forecast(SQUEEZE, timeout=60), aio.wait_for_cycle(3, 30))
+        assert forecast.outcome == "applied" and status.cycle >= 3
+        order = await aio.order(SQUEEZE)
+        await order.wait(60)
+        assert order.status == "applied"
+        await aio.set("heating", 2, timeout=30)
+        with pytest.raises(tombolo.WaitError):
+            await aio.wait_for(lambda: False, 0.2)
+        task = asyncio.create_task(aio.wait_for(lambda: False))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        async for event in aio.events("monitor"):
+            assert event.data["pipeline"] == "health"
+            break
+        assert await aio.stack() == run.stack and await aio.pipelines() == run.pipelines
+        cut = {"name": "cut", "stages": [{"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}
+        await aio.change_pipelines({"set": [cut]}, timeout=30)
+        assert (await aio.wait_for_view("cut", timeout=30)).name == "cut"
+        with pytest.raises(KeyError, match="cut"):
+            await aio.wait_for_view("cub", timeout=1)
+        # What is told from this call on comes, whenever it is first asked for.
+        events = aio.events("order")
+        await (await aio.undo()).wait(60)
+        assert (await events.__anext__()).data["status"] == "accepted"
+        await aio.close()
+        assert [event async for event in events] == []
+
+    asyncio.run(work())
+
+
+def test_what_is_cancelled_before_the_wheel_is_there_is_not_given(solver):
+    other = tombolo.connect(solver.link)
+    other.drive()
+    with tombolo.connect(solver.link) as run:
+        run.wait_for(lambda: run.features, 30)
+        other.close()
+        # The wheel is kept for that one for some seconds.
+        run.wait_for(lambda: run.status.driver is None, 30)
+
+        async def give():
+            asked = (run.aio.order(SQUEEZE), run.aio.undo(), run.aio.set("heating", 7), run.aio.pause())
+            ended = await asyncio.gather(*(asyncio.wait_for(it, 0.3) for it in asked), return_exceptions=True)
+            assert all(isinstance(it, asyncio.TimeoutError) for it in ended), ended
+
+        asyncio.run(give())
+        # All its threads have ended, so that nothing can be given any more.
+        cycle = run.status.cycle
+        run.wait_for_cycle(cycle + 50, 30)
+        assert run.orders == [] and not run.status.paused and 7 not in solver.heating
+
+
+def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
+    relay = Relay(solver.link)
+    with tombolo.connect(relay.link) as run:
+        run.wait_for(lambda: run.features, 30)
+        run.drive()
+        relay.swallows = True
+
+        def let_through():
+            relay.swallows = False
+            relay.cut()
+
+        # A program that is held up goes on then.
+        late = threading.Timer(30.0, let_through)
+        late.start()
+        begun = time.monotonic()
+
+        async def ask():
+            with pytest.raises(asyncio.TimeoutError):
+                await asyncio.wait_for(run.aio.forecast(SQUEEZE), 0.3)
+
+        asyncio.run(ask())
+        assert time.monotonic() - begun < 15
+        late.cancel()
+    relay.server.close()
+
+
+def test_events_go_on_after_one_was_waited_for_in_vain(begin):
+    running = begin(step=0.2)
+    with tombolo.connect(running.link) as run:
+
+        async def follow():
+            events, cycles, waited = run.aio.events("monitor"), [], 0
+            while len(cycles) < 5:
+                try:
+                    cycles.append((await asyncio.wait_for(events.__anext__(), 0.03)).data["cycle"])
+                except asyncio.TimeoutError:
+                    waited += 1
+            return cycles, waited
+
+        cycles, waited = asyncio.run(follow())
+    assert waited > 3
+    # None is lost.
+    assert cycles == list(range(cycles[0], cycles[0] + 5))
