@@ -44,10 +44,10 @@ impl Playback {
         let file = file.as_ref();
         let recording = Recording::open(file)?;
         if recording.lost_bytes() > 0 {
-            log::warn!(
-                "{}: the last {} bytes cannot be read; what was recorded before is shown",
-                file.display(),
-                recording.lost_bytes()
+            let (path, lost) = (file.display(), recording.lost_bytes());
+            tracing::warn!(
+                %path,
+                "{path}: the last {lost} bytes cannot be read; what was recorded before is shown"
             );
         }
         Ok(Self { server: Server::play(settings, file)? })

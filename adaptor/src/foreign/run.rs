@@ -260,7 +260,7 @@ impl Run {
     fn tell(&mut self, channels: &[Channel<'_>]) {
         for note in channels.iter().flat_map(|channel| &channel.notes) {
             if self.communicator.rank() == 0 && self.told.insert(note.clone()) {
-                log::warn!("{note}");
+                tracing::warn!(run = self.adaptor.run_id(), "{note}");
             }
         }
     }

@@ -227,7 +227,7 @@ impl Drop for Worker {
             if Instant::now() >= until {
                 // What it is at cannot be given up, such as the set-up of an operator. It hands
                 // nothing to anybody any more, and ends with the process at the latest.
-                log::warn!("a thread that finds shapes is still at work; it is left behind");
+                tracing::warn!("a thread that finds shapes is still at work; it is left behind");
                 return;
             }
             std::thread::sleep(Duration::from_millis(1));

@@ -22,6 +22,7 @@ use tokio_tungstenite::{
     },
 };
 use tombolo_pipelines::language::{RelayAddress, RunName, StreamServer};
+use tracing::debug;
 
 use super::{
     StreamError,
@@ -56,6 +57,8 @@ const ADDRESS: usize = 1024;
 
 /// A run's place at a relay.
 pub(super) struct Connect {
+    /// The number of the run.
+    run: Option<Arc<str>>,
     relay: Arc<RelayAddress>,
     /// The relay's secret for runs.
     secret: Secret,
@@ -81,7 +84,10 @@ struct Lost {
 
 impl Connect {
     /// The place that the settings ask for, if they do.
-    pub(super) fn of(settings: &StreamServer) -> Result<Option<Arc<Self>>, StreamError> {
+    pub(super) fn of(
+        settings: &StreamServer,
+        run: Option<&str>,
+    ) -> Result<Option<Arc<Self>>, StreamError> {
         let Some(relay) = &settings.connect else { return Ok(None) };
         let secret = relay_secret(settings)?;
         let name = match &settings.name {
@@ -94,8 +100,8 @@ impl Connect {
         let instance = Secret::random().map_err(StreamError::Token)?;
         let state = State { attached, is_connected: false, is_given_up: false };
         let (state, changed) = (Mutex::new(state), Condvar::new());
-        let relay = Arc::new(relay.clone());
-        Ok(Some(Arc::new(Self { relay, secret, instance, state, changed })))
+        let (run, relay) = (run.map(Into::into), Arc::new(relay.clone()));
+        Ok(Some(Arc::new(Self { run, relay, secret, instance, state, changed })))
     }
 
     /// The address of the relay.
@@ -125,7 +131,9 @@ impl Connect {
         loop {
             let Lost { reason, was_connected } = match self.join().await {
                 Ok((socket, attached)) => {
-                    log::info!("this run is {} at the relay {}", attached.name, self.relay);
+                    let (run, name) = (self.run.as_deref(), &attached.name);
+                    let address = &self.relay;
+                    tracing::info!(run, %name, %address, "this run is {name} at the relay {address}");
                     let is_new = self.connected(&attached);
                     if is_new {
                         renamed();
@@ -140,9 +148,12 @@ impl Connect {
                 (pause, is_reported) = (FIRST_PAUSE, false);
             }
             if !std::mem::replace(&mut is_reported, true) {
-                log::warn!(
-                    "the relay {} is not reached, and it is tried again and again: {reason}",
-                    self.relay
+                let (run, address) = (self.run.as_deref(), &self.relay);
+                tracing::warn!(
+                    run,
+                    %address,
+                    reason,
+                    "the relay {address} is not reached, and it is tried again and again: {reason}"
                 );
             }
             sleep(varied(pause)).await;
@@ -234,8 +245,8 @@ impl Connect {
                 dials.spawn(async move {
                     match timeout(ANSWER, carry(&relay, &secret, &open)).await {
                         Ok(Ok(accepted)) => entrance.take(accepted, way).await,
-                        Ok(Err(reason)) => log::debug!("no connection for a viewer: {reason}"),
-                        Err(_) => log::debug!("no connection for a viewer: the relay is silent"),
+                        Ok(Err(reason)) => debug!("no connection for a viewer: {reason}"),
+                        Err(_) => debug!("no connection for a viewer: the relay is silent"),
                     }
                 });
             }

@@ -114,7 +114,7 @@ impl Shown {
                 let player = Recording::open(&file).map_err(|error| error.to_string());
                 match player.map(|recording| Player::new(recording, messages, said, decoded)) {
                     Ok(mut player) => player.run(),
-                    Err(reason) => log::warn!("{reason}"),
+                    Err(reason) => tracing::warn!(path = %file.display(), "{reason}"),
                 }
             }
         };

@@ -136,7 +136,8 @@ impl Steerer {
                 worker.prepare(self.defaults.deform.clone());
                 if let Some(Err(error)) = self.skeleton.take().map(|extract| worker.beside(extract))
                 {
-                    log::warn!("the first drag will extract the skeleton: {error}");
+                    let run = self.log.run();
+                    tracing::warn!(run, "the first drag will extract the skeleton: {error}");
                 }
             }
             None if self.domain.communicator().size() > 1 => {
@@ -545,7 +546,7 @@ mod tests {
     use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
 
     use super::*;
-    use crate::journal::Journal;
+    use crate::{journal::Journal, steering::Told};
 
     /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
     #[test]
@@ -553,7 +554,7 @@ mod tests {
         let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
         let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
         let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
-        let log = Arc::new(Log::new(Journal::none(), None));
+        let log = Arc::new(Log::new(Journal::none(), None, Told::default()));
         let steerer =
             Steerer::new(shaper, Defaults::default(), log, Arc::default(), false).unwrap();
         let planner = Arc::clone(&steerer.planner);

@@ -51,7 +51,8 @@ pub(super) async fn attach(
     upgrade.on_upgrade(move |mut socket| async move {
         connection.upgraded();
         if let Err(reason) = keep(&mut socket, &relay, &connection, &host).await {
-            log::warn!("a run from {} was not taken in: {reason}", connection.address());
+            let address = connection.address();
+            tracing::warn!(%address, reason, "a run from {address} was not taken in: {reason}");
             let close = CloseFrame { code: REFUSED, reason: reason.into() };
             let _ = socket.send(Message::Close(Some(close))).await;
         }
@@ -84,7 +85,8 @@ async fn keep(
         .attach(&name, instance, connection.address())
         .ok_or_else(|| format!("{RUNS} runs are connected already"))?;
     let run = Seat { relay, run };
-    log::info!("the run {} has connected from {}", run.run.name, connection.address());
+    let (name, address) = (&run.run.name, connection.address());
+    tracing::info!(%name, %address, "the run {name} has connected from {address}");
     let attached = Attached {
         address: format!("{}/{}/", relay.base(host), run.run.name),
         name: run.run.name.clone(),
@@ -131,7 +133,8 @@ struct Seat<'a> {
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
         self.relay.runs.leave(&self.run);
-        log::info!("the run {} has left", self.run.name);
+        let name = &self.run.name;
+        tracing::info!(%name, "the run {name} has left");
     }
 }
 
