@@ -35,6 +35,7 @@ use super::{
     tls::machine,
 };
 use crate::{
+    client::Link,
     dial::{Stream, connect, dial, encrypt},
     lock::lock,
 };
@@ -205,9 +206,12 @@ impl Connect {
             };
             let attached: Attached =
                 serde_json::from_str(&text).map_err(|_| "it is no relay".to_owned())?;
-            // It stands in links, which people and programs are given.
+            // They stand in links, which people and programs are given.
             if !is_address(&attached.address) {
                 return Err("it gives this run an address that none can have".into());
+            }
+            if !attached.sha256.as_deref().is_none_or(is_fingerprint) {
+                return Err("it gives this run a certificate's fingerprint that is none".into());
             }
             Ok((socket, attached))
         };
@@ -305,6 +309,12 @@ fn is_address(text: &str) -> bool {
         && text.chars().all(is_plain)
         && text.ends_with('/')
         && rest.is_some_and(|rest| !rest.starts_with('/'))
+        && format!("{text}?token=x").parse::<Link>().is_ok()
+}
+
+/// Whether a text is the SHA-256 fingerprint of a certificate.
+fn is_fingerprint(text: &str) -> bool {
+    text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit())
 }
 
 /// Why a relay does not let a run in.
@@ -355,10 +365,21 @@ mod tests {
         for address in ["https://relay.host:7400/nozzle/", "http://[::1]:7400/nozzle-2/"] {
             assert!(is_address(address), "{address}");
         }
-        for text in
-            ["", "https:///", "https://relay/run", "ftp://relay/", "https://relay/?token=x/"]
-        {
+        for text in [
+            "",
+            "https:///",
+            "https://relay/run",
+            "ftp://relay/",
+            "https://relay/?token=x/",
+            "https://relay:0/",
+            "https://name@relay/",
+            "https://[relay]/",
+        ] {
             assert!(!is_address(text), "{text}");
+        }
+        assert!(is_fingerprint(&"0a".repeat(32)));
+        for text in ["", "0a", &"0g".repeat(32), "\ndrive: https://elsewhere/?token=x"] {
+            assert!(!is_fingerprint(text), "{text}");
         }
     }
 

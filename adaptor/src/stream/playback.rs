@@ -321,7 +321,8 @@ impl Player {
                 Seek::Cycle(cycle) => self.recording.seconds_of_cycle(cycle),
                 Seek::Time(time) => self.recording.seconds_of_time(time),
             };
-            self.go_to(seconds.clamp(first, last))?;
+            // A damaged file may have them the wrong way round.
+            self.go_to(seconds.max(first).min(last))?;
         }
         self.tell()
     }
