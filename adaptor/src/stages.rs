@@ -323,7 +323,7 @@ impl Pipelines {
                 }
                 Output::Log { pipeline, level, message } => {
                     let (run, pipeline) = (&*self.run, &*pipeline);
-                    let message = format!("cycle {cycle}, pipeline '{pipeline}': {message}");
+                    let message = format_args!("cycle {cycle}, pipeline '{pipeline}': {message}");
                     match level {
                         LogLevel::Info => info!(run, cycle, pipeline, "{message}"),
                         LogLevel::Warning => warn!(run, cycle, pipeline, "{message}"),

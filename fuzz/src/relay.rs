@@ -31,6 +31,8 @@ use crate::{
 const SECRET: &str = "0123456789abcdef0123456789abcdef";
 /// The ticket by which it is known that a run has read everything.
 const LAST: &str = "ffffffffffffffffffffffffffffffff";
+/// Messages of a relay: a run lets those go that ask for more than 64 connections at once.
+const SAID: usize = 32;
 /// Bytes of a message between a run and a relay, and of one that a viewer may say to a recording.
 const RELAYED: usize = 4096;
 const WATCHED: usize = 1 << 16;
@@ -137,7 +139,7 @@ enum Read {
 pub(crate) fn relayed(seeds: &Seeds, text: &str) -> Result<String, String> {
     let at = text.match_indices("HTTP/").map(|(at, _)| at).next().unwrap_or(text.len());
     let (said, answer) = text.split_at(at);
-    let mut said: Vec<String> = said.lines().map(str::to_owned).collect();
+    let mut said: Vec<String> = said.lines().take(SAID).map(str::to_owned).collect();
     said.push(json!({"ticket": LAST, "viewer": "192.0.2.2"}).to_string());
     let answer = answer.replace('\n', "\r\n");
     let (tell, told) = channel();
@@ -284,10 +286,13 @@ impl Watching {
                     if error["id"] == last {
                         return Ok(Some(outcome));
                     }
-                    if id.as_ref().is_some_and(|id| *id != error["id"]) {
+                    let message = error["message"].as_str().unwrap_or_default();
+                    // The player has not come to what was said before.
+                    let is_late = error["id"].is_null() && message.contains("messages that wait");
+                    if !is_late && id.as_ref().is_some_and(|id| *id != error["id"]) {
                         return Err(format!("it is told of another message: {error}"));
                     }
-                    outcome = error["message"].as_str().unwrap_or_default().to_owned();
+                    outcome = message.to_owned();
                 }
                 Ok(Message::Close(_)) | Err(_) => return Ok(None),
                 Ok(_) => {}

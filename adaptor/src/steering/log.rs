@@ -455,7 +455,8 @@ impl Log {
             "shape {shape} of {shapes}, handed out at cycle {}, was the last: no call after it shows whether the solver's mesh is there",
             handed_out.cycle
         );
-        if let (Some(run), cycle) = (self.run(), handed_out.cycle) {
+        if let Some(run) = self.run() {
+            let cycle = handed_out.cycle;
             tracing::info!(
                 run,
                 cycle,

@@ -51,11 +51,14 @@ impl Told {
     pub(super) fn order(&self, order: &str, status: &str, reason: Option<&str>) {
         let Some(run) = self.run() else { return };
         let cycle = self.clock.get().cycle;
-        let why = reason.map(|reason| format!(": {reason}")).unwrap_or_default();
-        if status == OrderStatus::Computing.name() {
-            debug!(run, cycle, order, status, "order '{order}': {status}");
-        } else {
-            info!(run, cycle, order, status, reason, "order '{order}': {status}{why}");
+        match reason {
+            Some(reason) => {
+                info!(run, cycle, order, status, reason, "order '{order}': {status}: {reason}");
+            }
+            None if status == OrderStatus::Computing.name() => {
+                debug!(run, cycle, order, status, "order '{order}': {status}");
+            }
+            None => info!(run, cycle, order, status, "order '{order}': {status}"),
         }
     }
 
