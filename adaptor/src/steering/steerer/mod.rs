@@ -119,7 +119,8 @@ impl Steerer {
         }
         let in_advance = shaper.skeleton_in_advance().filter(|_| skeleton);
         let mut steerer = Self::of_shaper(shaper, defaults, log);
-        steerer.worker = Some(Worker::start(Arc::clone(&steerer.planner), queue)?);
+        let run = steerer.log.run();
+        steerer.worker = Some(Worker::start(Arc::clone(&steerer.planner), queue, run)?);
         steerer.skeleton = in_advance.map(|extract| Box::new(extract) as Box<_>);
         Ok(steerer)
     }
