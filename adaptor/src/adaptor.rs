@@ -30,7 +30,7 @@ use std::{
     time::Instant,
 };
 
-use checkpointing::Given;
+use checkpointing::{Given, random_name};
 use contract::Lent;
 use restarting::{Continued, Resumed};
 use serde_json::Value;
@@ -72,7 +72,7 @@ pub struct Adaptor {
     pipelines: Pipelines,
     timed: Timed,
     /// The number of the run, by which its journal tells it apart from others.
-    run: String,
+    run: Arc<str>,
     given: Given,
     /// The rest of the checkpoint that the run goes on from.
     resumed: Resumed,
@@ -176,6 +176,13 @@ impl Adaptor {
         Settings::from_file(file)
     }
 
+    /// The number of the run, the same on all ranks: its journal and the events that it tells of itself
+    /// ([`logging`](crate::logging)) have it, so that they can be told apart from those of another run.
+    #[must_use]
+    pub fn run_id(&self) -> &str {
+        &self.run
+    }
+
     /// The value of a parameter now; `None` where there is none of that name.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<f64> {
@@ -199,7 +206,9 @@ impl Adaptor {
         let _alarm = Alarm::among(&communicator);
         let own = serde_json::to_vec(&(&settings.config, &settings.orders, &settings.replay));
         let continued = Continued::of(&mut settings)?;
-        let adaptor = Self::set_up(settings, continued);
+        let mut run = random_name().into_bytes();
+        communicator.broadcast(0, &mut run);
+        let adaptor = Self::set_up(settings, continued, String::from_utf8_lossy(&run).into());
         if communicator.size() == 1 {
             return adaptor;
         }

@@ -47,6 +47,11 @@ impl Changes {
         Self { queue, log, clock, parameters, state }
     }
 
+    /// The number of the run, as its events have it.
+    pub(crate) fn run(&self) -> Option<&str> {
+        self.log.run()
+    }
+
     /// The configuration as it will be once the changes that wait have been made.
     pub(crate) fn ahead(&self) -> Arc<Config> {
         let (mut config, under_way) = {
@@ -197,11 +202,13 @@ mod tests {
 
     use super::*;
     use crate::journal::Journal;
+    use crate::steering::Told;
 
     fn changes() -> Changes {
         let text = r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"quality": {}}]}]}"#;
         let config = Arc::new(parse(text, "test.json").unwrap());
-        let (queue, log) = (Arc::default(), Arc::new(Log::new(Journal::none(), None)));
+        let (queue, log) =
+            (Arc::default(), Arc::new(Log::new(Journal::none(), None, Told::default())));
         Changes::new(config, Vec::new(), queue, log, Arc::default())
     }
 

@@ -388,9 +388,10 @@ impl Communicator for Mpi {
     }
 
     fn abort(&self) {
-        log::error!(
-            "rank {} failed in itself; all ranks are ended, because the others would wait for it",
-            self.rank
+        let rank = self.rank;
+        tracing::error!(
+            rank,
+            "rank {rank} failed in itself; all ranks are ended, because the others would wait for it"
         );
         // SAFETY: the handle is alive while this is.
         unsafe { ffi::MPI_Abort(self.as_raw(), 1) };

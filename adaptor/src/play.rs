@@ -44,10 +44,10 @@ impl Playback {
         let file = file.as_ref();
         let recording = Recording::open(file)?;
         if recording.lost_bytes() > 0 {
-            log::warn!(
-                "{}: {} bytes cannot be read; what else was recorded is shown",
-                file.display(),
-                recording.lost_bytes()
+            let (path, lost) = (file.display(), recording.lost_bytes());
+            tracing::warn!(
+                %path,
+                "{path}: {lost} bytes cannot be read; what else was recorded is shown"
             );
         }
         Ok(Self { server: Server::play(settings, file)? })

@@ -77,7 +77,8 @@ impl Recorder {
                     "the recording {} ends here: {reason}; the run goes on",
                     writing.path.display()
                 );
-                log::warn!("{message}");
+                let (run, path) = (writing.hub.run(), writing.path.display());
+                tracing::warn!(run, %path, reason, "{message}");
                 writing.hub.tell(move || json!({"error": {"message": message}}));
             }
             done.store(true, Ordering::Release);
@@ -108,7 +109,11 @@ impl Drop for Recorder {
         let until = Instant::now() + END;
         while !self.is_done.load(Ordering::Acquire) {
             if Instant::now() >= until {
-                log::warn!("the end of the recording is not on disk: the disk does not answer");
+                let run = self.hub.run();
+                tracing::warn!(
+                    run,
+                    "the end of the recording is not on disk: the disk does not answer"
+                );
                 return;
             }
             std::thread::sleep(Duration::from_millis(2));

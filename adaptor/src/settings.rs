@@ -110,11 +110,8 @@ impl Settings {
         let text = language::read_text(file, WAITING_BYTES)?;
         let recording = language::parse_journal(&text, &file.display().to_string())?;
         if recording.lost > 0 {
-            log::warn!(
-                "{}: {} lines are missing; the replay is that of what is there",
-                file.display(),
-                recording.lost
-            );
+            let (path, lost) = (file.display(), recording.lost);
+            tracing::warn!(%path, "{path}: {lost} lines are missing; the replay is that of what is there");
         }
         Ok(Self { replay: Some(recording), ..self })
     }

@@ -15,6 +15,7 @@ use tombolo_pipelines::{
     language::{Command, Config, ErrorBound, LogLevel, Monitor, Pipeline, Stage},
     run::{Cost, Encoding, Frame, History, MonitorValues, Output, Replacement, Runner},
 };
+use tracing::{error, info, warn};
 
 use crate::{
     checkpoint::CheckpointError,
@@ -41,6 +42,8 @@ pub(crate) struct Pipelines {
     drags_skeleton: bool,
     listens: bool,
     output: PathBuf,
+    /// The number of the run.
+    run: Arc<str>,
     writer: Writer,
 }
 
@@ -79,6 +82,7 @@ impl Pipelines {
         config: &Config,
         communicator: Arc<dyn Communicator>,
         output: &Path,
+        run: Arc<str>,
     ) -> Result<Self, InitializeError> {
         let runner = Runner::with_communicator(config, communicator)
             .map_err(|problem| InitializeError::Configuration(problem.into()))?;
@@ -93,6 +97,7 @@ impl Pipelines {
             drags_skeleton: false,
             listens: false,
             output: output.into(),
+            run,
             writer: Writer::default(),
         };
         pipelines.describe(config);
@@ -326,12 +331,13 @@ impl Pipelines {
                     self.writer.write(Job { pipeline, path, time, content });
                 }
                 Output::Log { pipeline, level, message } => {
-                    let level = match level {
-                        LogLevel::Info => log::Level::Info,
-                        LogLevel::Warning => log::Level::Warn,
-                        LogLevel::Error => log::Level::Error,
-                    };
-                    log::log!(level, "cycle {cycle}, pipeline '{pipeline}': {message}");
+                    let (run, pipeline) = (&*self.run, &*pipeline);
+                    let message = format_args!("cycle {cycle}, pipeline '{pipeline}': {message}");
+                    match level {
+                        LogLevel::Info => info!(run, cycle, pipeline, "{message}"),
+                        LogLevel::Warning => warn!(run, cycle, pipeline, "{message}"),
+                        LogLevel::Error => error!(run, cycle, pipeline, "{message}"),
+                    }
                 }
                 Output::Monitor(values) => {
                     if let Some(hub) = hub {

@@ -142,7 +142,8 @@ impl Watcher {
     }
 
     fn tell(&self, message: &str) {
-        log::warn!("{message}");
+        let (run, path) = (self.changes.run(), self.file.display());
+        tracing::warn!(run, %path, "{message}");
         if let Some(hub) = &self.hub {
             let message = message.to_owned();
             hub.tell(move || json!({"error": {"message": message}}));

@@ -18,6 +18,7 @@ use std::{
 
 use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
 use serde_json::Value;
+use tokio_tungstenite::tungstenite;
 use tombolo::{
     OrderStatus, Parameter, Report,
     client::{Client, ClientError, Event, Link, Options, Received},
@@ -341,6 +342,36 @@ fn answered_by(answer: &'static [u8]) -> ClientError {
     });
     let link: Link = format!("http://127.0.0.1:{port}/?token=abc").parse().expect("a link");
     Client::connect(&link, &Options::default()).err().expect("no run")
+}
+
+/// A server that greets as a run does, and answers every request by this.
+fn asked_of(answer: &'static str) -> Client {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    std::thread::spawn(move || {
+        let hello = r#"{"hello": {"protocol": 2, "client": "c1", "role": "watcher"}}"#;
+        let first = listener.accept().expect("a client").0;
+        let mut socket = tungstenite::accept(first).expect("a WebSocket");
+        socket.send(tungstenite::Message::text(hello)).expect("sent");
+        for mut stream in listener.incoming().flatten() {
+            let _ = stream.read(&mut [0; 4096]);
+            let _ = write!(stream, "HTTP/1.0 200 OK\r\n\r\n{answer}");
+        }
+    });
+    let link: Link = format!("http://127.0.0.1:{port}/?token=abc").parse().expect("a link");
+    Client::connect(&link, &Options::default()).expect("connected")
+}
+
+#[test]
+fn answers_without_an_end_or_with_what_is_not_seen_are_refused() {
+    // It would be asked for more 16384 times.
+    let begun = Instant::now();
+    let error = asked_of(r#"{"revision": 1, "count": 2, "edits": []}"#).stack().err();
+    assert!(matches!(error, Some(ClientError::NotTombolo { .. })), "{error:?}");
+    assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
+    let strange = r#"{"revision": 1, "count": 1, "edits": [{"\u001b[31m": {}}]}"#;
+    let error = asked_of(strange).stack().expect_err("no edit").to_string();
+    assert!(error.contains("[31m") && !error.chars().any(char::is_control), "{error:?}");
 }
 
 #[test]

@@ -106,7 +106,7 @@ fn faces_inside_the_mesh_are_told_once() {
     let told = Arc::new(Mutex::new(Vec::new()));
     let kept = Arc::clone(&told);
     let sink = move |_, message: &str| kept.lock().expect("no panic").push(message.to_owned());
-    logging::send_to(LevelFilter::Warn, Some(Box::new(sink))).expect("no other logger");
+    logging::send_to(LevelFilter::WARN, Some(Box::new(sink))).expect("no other logger");
     let inner = |tagged: &mut TaggedFaces, cells: &Cells| {
         let shared = |other: usize| -> Vec<u32> {
             cells
@@ -121,7 +121,7 @@ fn faces_inside_the_mesh_are_told_once() {
         add(tagged, &shared, 5);
     };
     assert_eq!(on_ranks(inner), [Ok(()), Ok(())]);
-    logging::send_to(LevelFilter::Warn, None).expect("no other logger");
+    logging::send_to(LevelFilter::WARN, None).expect("no other logger");
     let told = told.lock().expect("no panic");
     let words = "channel 'solid': 1 of 49 faces with features lie inside the mesh, and make no feature of its surface";
     assert_eq!(*told, [words, &words.replace("49", "145")]);

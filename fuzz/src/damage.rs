@@ -93,10 +93,22 @@ fn text(input: &mut Vec<u8>, other: &[u8], random: &mut Random) {
                 value_damage(&mut value, &whole(taken).unwrap_or_default(), random);
                 lines[at] = written(&value, random);
             }
+            None if random.below(2) == 0 => number(&mut lines[at], random),
             None => return bytes(input, other, random),
         },
     }
     *input = lines.join(&b'\n');
+}
+
+/// Puts another number in the place of one in a line.
+fn number(line: &mut Vec<u8>, random: &mut Random) {
+    let is_in_number = |byte: &u8| byte.is_ascii_digit() || b"+-.".contains(byte);
+    let from = random.below(line.len());
+    let Some(skipped) = line[from..].iter().position(u8::is_ascii_digit) else { return };
+    let begin = from + skipped;
+    let length = line[begin..].iter().take_while(|byte| is_in_number(byte)).count();
+    let number = random.choose(&NUMBERS).map_or("0", |number| number);
+    line.splice(begin..begin + length, number.bytes());
 }
 
 /// A value as JSON; one of its numbers may be one that `Value` cannot hold.

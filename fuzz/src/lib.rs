@@ -15,9 +15,13 @@
 //! too. `corpus/TARGET/` holds the inputs that once did harm; every pass begins with them.
 #![warn(missing_docs)]
 
+mod client;
 mod damage;
+mod meshes;
 mod random;
+mod relay;
 mod seeds;
+mod server;
 mod target;
 
 use std::{

@@ -13,6 +13,8 @@ use tombolo::{
     recording::{RecordedMessage, Recording},
 };
 
+use crate::relay::Services;
+
 /// Sound inputs of all kinds.
 pub struct Seeds {
     /// The JSON of the documents and of the examples.
@@ -23,8 +25,12 @@ pub struct Seeds {
     pub(crate) recording: Vec<u8>,
     /// The frames in the recording, as viewers are sent them.
     pub(crate) frames: Vec<Vec<u8>>,
+    /// The texts behind its greeting.
+    pub(crate) texts: Vec<String>,
     /// Checkpoints of the run: in the midst of a schedule, and behind it.
     pub(crate) checkpoints: Vec<Vec<u8>>,
+    /// Servers that are begun where they are needed.
+    pub(crate) services: Services,
     /// A folder for files.
     pub(crate) folder: tempfile::TempDir,
 }
@@ -33,6 +39,8 @@ pub struct Seeds {
 const PIPELINES: &str = r#"{"version": 1, "record": "run.tombolo", "journal": "journal.jsonl", "pipelines": [
     {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
     {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}]}]}"#;
+/// The recording of the run, as the configuration names it.
+const RECORDING: &str = "run.tombolo";
 /// Steps of the run.
 const STEPS: u64 = 12;
 
@@ -94,17 +102,24 @@ impl Seeds {
             |name: &str| fs::read(folder.path().join(name)).map_err(|error| error.to_string());
         let journal =
             String::from_utf8(read("journal.jsonl")?).map_err(|error| error.to_string())?;
-        let recording = read("run.tombolo")?;
-        let mut recorded = Recording::open(folder.path().join("run.tombolo"))
-            .map_err(|error| error.to_string())?;
-        let mut frames = Vec::new();
+        let recording = read(RECORDING)?;
+        let mut recorded =
+            Recording::open(folder.path().join(RECORDING)).map_err(|error| error.to_string())?;
+        let (mut frames, mut texts) = (Vec::new(), Vec::new());
         while let Ok(Some(message)) = recorded.read_next() {
-            if let RecordedMessage::Frame { bytes, .. } = message.message {
-                frames.push(bytes);
+            match message.message {
+                RecordedMessage::Frame { bytes, .. } => frames.push(bytes),
+                RecordedMessage::Text(text) if text.starts_with("{\"hello\"") => {}
+                RecordedMessage::Text(text) => texts.push(text),
             }
         }
-        let documents = documents();
-        Ok(Self { documents, journal, recording, frames, checkpoints, folder })
+        let (documents, services) = (documents(), Services::default());
+        Ok(Self { documents, journal, recording, frames, texts, checkpoints, services, folder })
+    }
+
+    /// The file of the recording.
+    pub(crate) fn recording_file(&self) -> PathBuf {
+        self.folder.path().join(RECORDING)
     }
 }
 

@@ -16,7 +16,9 @@ use tombolo::{
 };
 
 use crate::{
+    client, meshes,
     random::Random,
+    relay,
     seeds::{Seeds, run, settings},
 };
 
@@ -37,11 +39,33 @@ pub enum Target {
     Recordings,
     /// Checkpoints, and runs that go on from them.
     Checkpoints,
+    /// Links to runs, and addresses of relays.
+    Links,
+    /// The messages of a run, which a client reads.
+    Events,
+    /// The answers of a run to a client's requests.
+    Answers,
+    /// The messages of viewers to a recording that is played.
+    Playback,
+    /// The messages of runs, which a relay reads.
+    Attach,
+    /// The messages of a relay, which a run reads, and the heads of the connections that it makes there.
+    Relayed,
+    /// Files of Gmsh.
+    Msh,
+    /// Unstructured grids in VTK's XML.
+    Vtu,
+    /// Surfaces in VTK's XML.
+    Vtp,
+    /// VTK's legacy files.
+    Vtk,
+    /// Texts with displacements of a surface.
+    Displacements,
 }
 
 impl Target {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 18] = [
         Self::Orders,
         Self::Messages,
         Self::Frames,
@@ -49,6 +73,17 @@ impl Target {
         Self::Journal,
         Self::Recordings,
         Self::Checkpoints,
+        Self::Links,
+        Self::Events,
+        Self::Answers,
+        Self::Playback,
+        Self::Attach,
+        Self::Relayed,
+        Self::Msh,
+        Self::Vtu,
+        Self::Vtp,
+        Self::Vtk,
+        Self::Displacements,
     ];
 
     /// The name.
@@ -62,6 +97,17 @@ impl Target {
             Self::Journal => "journal",
             Self::Recordings => "recordings",
             Self::Checkpoints => "checkpoints",
+            Self::Links => "links",
+            Self::Events => "events",
+            Self::Answers => "answers",
+            Self::Playback => "playback",
+            Self::Attach => "attach",
+            Self::Relayed => "relayed",
+            Self::Msh => "msh",
+            Self::Vtu => "vtu",
+            Self::Vtp => "vtp",
+            Self::Vtk => "vtk",
+            Self::Displacements => "displacements",
         }
     }
 
@@ -80,6 +126,14 @@ impl Target {
             Self::Frames => seeds.frames.clone(),
             Self::Recordings => vec![seeds.recording.clone()],
             Self::Checkpoints => seeds.checkpoints.clone(),
+            Self::Links => client::link_seeds(),
+            Self::Events => client::event_seeds(seeds),
+            Self::Answers => client::answer_seeds(seeds),
+            Self::Playback => relay::playback_seeds(),
+            Self::Attach => relay::attach_seeds(),
+            Self::Relayed => relay::relayed_seeds(),
+            Self::Msh | Self::Vtu | Self::Vtp | Self::Vtk => meshes::mesh_seeds(self.name(), seeds),
+            Self::Displacements => meshes::displacement_seeds(seeds),
         }
     }
 
@@ -106,6 +160,16 @@ impl Target {
             Self::Frames => frames(seeds, input),
             Self::Recordings => recording(seeds, input),
             Self::Checkpoints => checkpoint(input),
+            Self::Links => with_text(input, client::link),
+            Self::Events => with_text(input, client::events),
+            Self::Answers => client::answers(input),
+            Self::Playback => with_text(input, |text| relay::playback(seeds, text)),
+            Self::Attach => with_text(input, |text| relay::attach(seeds, text)),
+            Self::Relayed => with_text(input, |text| relay::relayed(seeds, text)),
+            Self::Msh | Self::Vtu | Self::Vtp | Self::Vtk => {
+                meshes::mesh(self.name(), seeds, input)
+            }
+            Self::Displacements => meshes::displacement(seeds, input),
         }
     }
 }
@@ -126,6 +190,14 @@ fn messages(seeds: &Seeds) -> impl Iterator<Item = Vec<u8>> {
         json!({"here": {}}),
         json!({"hand_over": {"to": "c2"}}),
         json!({"kick": {"client": "c2"}}),
+        json!({"id": "l", "link": {"for": "watch"}}),
+        json!({"name": {"name": "Anna"}}),
+        json!({"follow": {"on": true}}),
+        json!({"camera": {"position": [0, 0, 5], "focal_point": [0, 0, 0], "view_up": [0, 1, 0],
+                          "parallel": false, "parallel_scale": 1, "view_angle": 30}}),
+        json!({"note": {"text": "here\nand there", "at": [1, 2.5, -3], "cycle": 3}}),
+        json!({"remove_note": {"number": 1}}),
+        json!({"id": "p", "pipelines": {"remove": ["boundary"]}}),
     ];
     let documents = seeds.documents.iter().filter_map(|text| serde_json::from_str(text).ok());
     let wrapped = documents.map(|document: Value| json!({"id": "c", "order": document}));
@@ -207,7 +279,7 @@ fn pipelines(text: &str) -> Result<String, String> {
 fn message(text: &str) -> Result<String, String> {
     match parse_message(text) {
         (_, Ok(Message::Command(command))) => {
-            let name = json!(command).as_object().and_then(|it| it.keys().next().cloned());
+            let name = command.name();
             returns(&command, |text| match parse_message(text) {
                 (_, Ok(Message::Command(command))) => Ok(command),
                 (_, Ok(_)) => Err("it is no command".into()),
@@ -215,11 +287,28 @@ fn message(text: &str) -> Result<String, String> {
             })?;
             // It is journaled, and kept in checkpoints.
             timed(command)?;
-            Ok(name.unwrap_or_default())
+            Ok(name.into())
         }
-        (id, Ok(_)) => Ok(format!("no command, {}", id.is_some())),
+        (id, Ok(Message::Question(question))) => {
+            returns(&question, |text| match parse_message(text) {
+                (_, Ok(Message::Question(question))) => Ok(question),
+                (_, Ok(_)) => Err("it is no question".into()),
+                (_, Err(error)) => Err(error.to_string()),
+            })?;
+            Ok(format!("a question, {}", id.is_some()))
+        }
+        (id, Ok(Message::Wheel(wheel))) => Ok(format!("{}, {}", kind(&wheel), id.is_some())),
+        (id, Ok(Message::Together(together))) => {
+            Ok(format!("{}, {}", kind(&together), id.is_some()))
+        }
         (id, Err(error)) => Ok(format!("{error}, {}", id.is_some())),
     }
+}
+
+/// The kind of a message.
+fn kind(message: &impl std::fmt::Debug) -> String {
+    let text = format!("{message:?}");
+    text.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_owned()
 }
 
 /// A command is the same where it is one of a file.

@@ -17,6 +17,9 @@ use crate::{
     step::Moment,
 };
 
+/// The [name](Command::name) of a change of the pipelines.
+const PIPELINES: &str = "pipelines";
+
 /// A change of the pipelines that all ranks know of.
 pub(super) struct WaitingChange {
     id: String,
@@ -86,7 +89,7 @@ impl Adaptor {
     /// Tells that the run ends before the changes that all ranks were told of are made.
     pub(super) fn end_changes(&mut self) {
         for WaitingChange { id, source, .. } in std::mem::take(&mut self.waiting_changes) {
-            self.end_command(&id, &source, self.saved.is_some());
+            self.end_command(PIPELINES, &id, &source, self.saved.is_some());
         }
     }
 
@@ -96,7 +99,13 @@ impl Adaptor {
         for WaitingChange { id, source, change, .. } in std::mem::take(&mut self.waiting_changes) {
             let made = self.make_change(&change, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);
-            self.settle(&id, &source, moment, made.as_ref().map(|_| ()).map_err(Clone::clone));
+            self.settle(
+                PIPELINES,
+                &id,
+                &source,
+                moment,
+                made.as_ref().map(|_| ()).map_err(Clone::clone),
+            );
             self.describe();
             if let (Ok(changed), Some(hub)) = (made, &self.hub) {
                 let Changed { added, replaced, removed, frames } = changed;

@@ -34,6 +34,9 @@ impl Adaptor {
         // too.
         let note = CheckpointNote { id: id.clone(), cycle, time };
         self.log.checkpoint(note);
+        if let Some(run) = self.log.run() {
+            tracing::debug!(run, cycle, checkpoint = &*id, "the checkpoint {id} is made");
+        }
         let changes = self.waiting_changes.iter().map(super::changing::WaitingChange::saved);
         let mut waiting: Vec<SavedCommand> = changes.chain(self.resumed.waiting()).collect();
         let before = waiting.len();
@@ -59,7 +62,7 @@ impl Adaptor {
         let parameters = self.parameters.all().iter().map(|it| (it.name.clone(), it.value));
         let run = SavedRun {
             id,
-            run: self.run.clone(),
+            run: self.run.as_ref().into(),
             rank: self.communicator.rank(),
             ranks: self.communicator.size(),
             has_begun: self.has_begun,
@@ -92,7 +95,13 @@ impl Adaptor {
     pub fn write_checkpoint(&mut self, file: impl AsRef<Path>) -> Result<(), CheckpointError> {
         let checkpoint = self.checkpoint();
         let _alarm = Alarm::among(&self.communicator);
-        write_of_ranks(&*self.communicator, file.as_ref(), &checkpoint)
+        let file = file.as_ref();
+        write_of_ranks(&*self.communicator, file, &checkpoint)?;
+        if let Some(run) = self.log.run() {
+            let (cycle, path) = (checkpoint.run.cycle, file.display());
+            tracing::info!(run, cycle, %path, "the checkpoint {path} is written");
+        }
+        Ok(())
     }
 }
 

@@ -91,7 +91,8 @@ impl Adaptor {
         if self.communicator.rank() > 0 {
             return;
         }
-        log::warn!("{message}");
+        let (run, cycle) = (&*self.run, self.moment.cycle);
+        tracing::warn!(run, cycle, "{message}");
         if let Some(hub) = &self.hub {
             let message = message.to_owned();
             hub.tell(move || json!({"error": {"message": message}}));
@@ -206,6 +207,7 @@ impl Adaptor {
         reservation: Option<Reservation>,
         moment: Moment,
     ) {
+        let name = command.name();
         let outcome = match command {
             Command::Order(order) => {
                 let background = self.config.steering.background
@@ -250,14 +252,13 @@ impl Adaptor {
                 return self.keep_change(id, source.clone(), change, reservation);
             }
         };
-        self.settle(&id, source, moment, outcome);
+        self.settle(name, &id, source, moment, outcome);
     }
 
     /// Takes an order back that has not begun to move the mesh.
     fn cancel(&mut self, order: &str, source: &Source, moment: Moment) -> Result<(), String> {
         self.withdraw(order)?;
-        let reason = format!("cancelled{}", by(source));
-        self.log.reject(order, moment, &reason.into());
+        self.log.cancel(order, moment, format!("cancelled{}", by(source)));
         Ok(())
     }
 
@@ -300,6 +301,7 @@ impl Adaptor {
     /// Notes what became of a command that is no order, and tells who gave it.
     pub(super) fn settle(
         &self,
+        command: &str,
         id: &str,
         source: &Source,
         moment: Moment,
@@ -308,7 +310,7 @@ impl Adaptor {
         if let (Err(reason), false) = (&outcome, matches!(source, Source::Viewer(_))) {
             self.complain(&format!("command '{id}': {reason}"));
         }
-        self.log.settle(id, source, moment, outcome);
+        self.log.settle(command, id, source, moment, outcome);
         self.tell_conditions();
     }
 }
@@ -355,7 +357,9 @@ impl Intake {
         let (source, command) = (Source::Program, Command::Resume {});
         // It has no name of its own that could be taken.
         if let Ok(id) = self.log.accept(None, &source, &command, self.hub.clock.get()) {
-            log::warn!(
+            let run = self.log.run();
+            tracing::warn!(
+                run,
                 "the run was paused and nobody was there who could resume it for {} seconds: it goes on",
                 patience.as_secs()
             );

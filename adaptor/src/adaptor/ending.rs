@@ -75,17 +75,18 @@ impl Adaptor {
                     true
                 }
             };
+            let name = command.name();
             match command {
                 Command::Order(_) if goes_on => self.log.leave_open(&id),
                 Command::Order(_) => self.log.reject(&id, self.moment, &TOO_LATE.into()),
                 // It ends, as was asked.
-                Command::Stop {} => self.log.settle(&id, &source, self.moment, Ok(())),
+                Command::Stop {} => self.log.settle(name, &id, &source, self.moment, Ok(())),
                 // They were for this run alone.
                 Command::Pause {} | Command::Resume {} | Command::Cancel(_) => {
-                    self.end_command(&id, &source, false);
+                    self.end_command(name, &id, &source, false);
                 }
                 Command::Parameter(_) | Command::Pipelines(_) => {
-                    self.end_command(&id, &source, goes_on);
+                    self.end_command(name, &id, &source, goes_on);
                 }
             }
         }
@@ -93,11 +94,11 @@ impl Adaptor {
 
     /// Tells of a command that is no order that the run ended before its turn came. Where the run
     /// `goes_on` from a checkpoint, it is carried out there, and stays open in the journal.
-    pub(super) fn end_command(&self, id: &str, source: &Source, goes_on: bool) {
+    pub(super) fn end_command(&self, command: &str, id: &str, source: &Source, goes_on: bool) {
         if goes_on {
             self.log.leave_command_open(id, source, self.moment);
         } else {
-            self.log.settle(id, source, self.moment, Err(TOO_LATE.into()));
+            self.log.settle(command, id, source, self.moment, Err(TOO_LATE.into()));
         }
     }
 }

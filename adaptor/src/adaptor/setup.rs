@@ -8,12 +8,12 @@ use std::{
 
 use serde_json::json;
 use tombolo_pipelines::language::{
-    self, JournalNote, Problem, Problems, Recording, RestartedFrom, RunHeader, Validate,
+    self, Problem, Problems, Recording, RestartedFrom, RunHeader, Validate,
 };
 
 use super::{
     Adaptor, Meetings, SteeredMesh,
-    checkpointing::{Given, hash_of, random_name},
+    checkpointing::{Given, hash_of},
     commands::Intake,
     contract::Lent,
     restarting::Continued,
@@ -27,7 +27,7 @@ use crate::{
     recorder::Recorder,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, EditStack, Log, Parameters, Queue, Timed},
+    steering::{Defaults, EditStack, Log, Parameters, Queue, Timed, Told},
     step::Moment,
     stream::{Clock, Hub, Server},
     watch::Watch,
@@ -38,6 +38,7 @@ impl Adaptor {
     pub(super) fn set_up(
         settings: Settings,
         continued: Option<Continued>,
+        run: Arc<str>,
     ) -> Result<Self, InitializeError> {
         let Settings {
             config,
@@ -59,33 +60,32 @@ impl Adaptor {
         language::check_parameters(&config, &known).map_err(InitializeError::Configuration)?;
         let first = communicator.rank() == 0;
         let is_replay = replay.is_some();
-        let Recording { run, commands, shapes, mut notes, .. } = replay.unwrap_or_default();
+        let Recording { run: before, commands, shapes, mut notes, .. } = replay.unwrap_or_default();
         let orders = if is_replay { commands } else { orders };
-        let mut defaults = run.map_or_else(|| Defaults::of(&config), Defaults::from);
+        let mut defaults = before.map_or_else(|| Defaults::of(&config), Defaults::from);
         let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
         let mut given = Given { pipelines: config.pipelines.clone(), orders: hash_of(&orders) };
         let (mut orders, mut moment) = (orders, Moment::default());
-        if let Some(Continued { checkpoint: Checkpoint { run, .. }, .. }) = &continued {
-            moment = Moment { cycle: run.cycle, time: run.time };
-            if config.pipelines == run.pipelines[1] {
-                given.pipelines.clone_from(&run.pipelines[0]);
-                defaults.clone_from(&run.defaults);
+        if let Some(Continued { checkpoint: Checkpoint { run: saved, .. }, .. }) = &continued {
+            moment = Moment { cycle: saved.cycle, time: saved.time };
+            if config.pipelines == saved.pipelines[1] {
+                given.pipelines.clone_from(&saved.pipelines[0]);
+                defaults.clone_from(&saved.defaults);
             }
             // The commands of another file take the place of those that were to come.
-            if given.orders == run.timed.0 {
-                orders.clone_from(&run.timed.1);
+            if given.orders == saved.timed.0 {
+                orders.clone_from(&saved.timed.1);
             }
             notes = continued.iter().flat_map(Continued::notes).cloned().collect();
-            for (name, value) in &run.parameters {
+            for (name, value) in &saved.parameters {
                 if let Err(reason) = parameters.resume(name, *value) {
-                    log::warn!("of the checkpoint: {reason}");
+                    tracing::warn!(run = &*run, "of the checkpoint: {reason}");
                 }
             }
         }
-        let run = random_name();
         let queue = Arc::new(Queue::default());
         let has_audience = config.stream.is_some() || config.record.is_some();
-        let hub = (has_audience && first).then(|| Arc::new(Hub::default()));
+        let hub = (has_audience && first).then(|| Arc::new(Hub::new(Arc::clone(&run))));
         if let Some(hub) = &hub {
             hub.offer_pipelines(&config.pipelines);
         }
@@ -96,12 +96,14 @@ impl Adaptor {
             }
             None => Journal::none(),
         };
-        let log = Arc::new(Log::new(journal, hub.clone()));
-        log.resume_notes(notes);
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
         clock.set(moment);
+        let told = Told::new(first.then(|| Arc::clone(&run)), Arc::clone(&clock));
+        let log = Arc::new(Log::new(journal, hub.clone(), told));
+        log.resume_notes(notes);
         let config = Arc::new(config);
-        let mut pipelines = Pipelines::new(&config, Arc::clone(&communicator), &output)?;
+        let mut pipelines =
+            Pipelines::new(&config, Arc::clone(&communicator), &output, Arc::clone(&run))?;
         if let Some(Continued { checkpoint, .. }) = &continued {
             log.resume(checkpoint.run.known.clone());
             let last = checkpoint.run.has_begun.then_some(moment);
@@ -230,8 +232,8 @@ fn open_journal(
         schedule,
         restart,
     };
-    let file = path.to_owned();
-    Journal::open(path, &JournalNote::Run(header), move |lost| {
+    let (file, run) = (path.to_owned(), run.to_owned());
+    Journal::open(path, header, move |lost| {
         let message = match lost {
             Some(reason) => format!(
                 "the journal {} cannot be written: {reason}; no order is taken until it can",
@@ -239,7 +241,8 @@ fn open_journal(
             ),
             None => format!("the journal {} is written again", file.display()),
         };
-        log::warn!("{message}");
+        let (run, path) = (&*run, file.display());
+        tracing::warn!(run, %path, reason = lost, "{message}");
         if let Some(hub) = &hub {
             hub.journal(lost);
             if lost.is_some() {

@@ -164,7 +164,7 @@ impl Adaptor {
         let note = cells.handedness_note().unwrap_or_default();
         let notes = self.communicator.gather(0, note.as_bytes()).unwrap_or_default();
         if let Some(note) = notes.iter().find(|note| !note.is_empty()) {
-            log::warn!("{}", String::from_utf8_lossy(note));
+            tracing::warn!(run = self.run_id(), "{}", String::from_utf8_lossy(note));
         }
     }
 

@@ -228,7 +228,10 @@ async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Ove
                 if options.views {
                     match decoder.decode(&bytes) {
                         Ok(frame) => shared.with(|state| state.put_frame(frame)),
-                        Err(error) => return Over::Lost(format!("a broken frame: {error}")),
+                        Err(error) => {
+                            let reason = shown(error.to_string().as_bytes());
+                            return Over::Lost(format!("a broken frame: {reason}"));
+                        }
                     }
                 }
             }

@@ -1,8 +1,11 @@
 //! The link that a run prints.
 
-use std::{fmt, str::FromStr};
-
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    net::Ipv6Addr,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use super::ClientError;
 
@@ -183,14 +186,22 @@ impl FromStr for Link {
             }
             _ => (authority, usual),
         };
-        let is_bracketed = host.starts_with('[') && host.ends_with(']');
+        let is_bracketed = host
+            .strip_prefix('[')
+            .and_then(|host| host.strip_suffix(']'))
+            .is_some_and(|host| host.parse::<Ipv6Addr>().is_ok());
         let known = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
         if host.is_empty() || !is_bracketed && !host.chars().all(known) {
             return Err(wrong("it names no host"));
         }
         let path = path.trim_matches('/');
         let prefix = if path.is_empty() { String::new() } else { format!("/{path}") };
-        Ok(Self { host: host.into(), port, way, prefix, token })
+        let link = Self { host: host.into(), port, way, prefix, token };
+        // With the port that it does not name: what it prints can be read.
+        if link.to_string().len() > LENGTH {
+            return Err(wrong("it is too long"));
+        }
+        Ok(link)
     }
 }
 
@@ -258,6 +269,10 @@ mod tests {
             "unix:tombolo.sock?token=a",
             "unix:/tombolo.sock",
             "ftp://host/?token=a",
+            "http://[]/?token=a",
+            "http://[a@b]/?token=a",
+            "http://[::1]:80]/?token=a",
+            &format!("http://host/{}/?token=a", "a".repeat(4074)),
         ] {
             assert!(matches!(read(wrong), Err(ClientError::Link { .. })), "{wrong}");
         }

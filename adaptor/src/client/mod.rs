@@ -90,7 +90,7 @@ use tombolo_deform::{edit::Edit, surface::Surface};
 use tombolo_pipelines::{
     encode::decode_surface,
     language::{Change, Command, LinkFor, Order, Parameter, Question},
-    limits::{DOCUMENT, EDITS},
+    limits::{DOCUMENT, EDITS, ORDERS_BYTES},
 };
 
 pub use error::ClientError;
@@ -389,8 +389,7 @@ impl Client {
     /// [`ClientError`] where the answer is none.
     pub fn pipelines(&self) -> Result<Value, ClientError> {
         let body = self.get("pipelines", "", DOCUMENT.most)?;
-        serde_json::from_slice(&body)
-            .map_err(|error| get::not_tombolo(&self.link, error.to_string()))
+        serde_json::from_slice(&body).map_err(|error| self.wrong(&error))
     }
 
     /// The edits that make the shape now, the oldest first. Long ones come in several answers; where
@@ -405,20 +404,27 @@ impl Client {
             count: usize,
             edits: Vec<Edit>,
         }
-        let (mut revision, mut stack) = (None, Vec::new());
+        let (mut revision, mut stack, mut bytes) = (None, Vec::new(), 0_usize);
         for _ in 0..EDITS.most {
             let from = format!("&from={}", stack.len());
             let body = self.get("stack", &from, 2 * DOCUMENT.most)?;
-            let answer: Answer = serde_json::from_slice(&body)
-                .map_err(|error| get::not_tombolo(&self.link, error.to_string()))?;
+            let answer: Answer =
+                serde_json::from_slice(&body).map_err(|error| self.wrong(&error))?;
             if revision.is_some_and(|revision| revision != answer.revision) {
-                (revision, stack) = (None, Vec::new());
+                (revision, stack, bytes) = (None, Vec::new(), 0);
                 continue;
             }
             revision = Some(answer.revision);
+            let is_more = !answer.edits.is_empty();
+            bytes += answer.edits.iter().map(Edit::bytes).sum::<usize>();
+            ORDERS_BYTES.check(bytes).map_err(|exceeded| self.wrong(&exceeded))?;
             stack.extend(answer.edits);
+            EDITS.check(stack.len()).map_err(|exceeded| self.wrong(&exceeded))?;
             if stack.len() >= answer.count {
                 return Ok(stack);
+            }
+            if !is_more {
+                break;
             }
         }
         let found = "a stack of edits that has no end".into();
@@ -432,7 +438,12 @@ impl Client {
     /// changed.
     pub fn surface(&self) -> Result<Surface, ClientError> {
         let body = self.get("surface", "", SURFACE)?;
-        decode_surface(&body).map_err(|error| get::not_tombolo(&self.link, error.to_string()))
+        decode_surface(&body).map_err(|error| self.wrong(&error))
+    }
+
+    /// The error of an answer that cannot be read; the reason may hold words of the server.
+    fn wrong(&self, reason: &dyn std::fmt::Display) -> ClientError {
+        get::not_tombolo(&self.link, get::shown(reason.to_string().as_bytes()))
     }
 
     /// Asks for a path, with what comes behind the token in its query.

@@ -295,7 +295,7 @@ impl Run {
         for channel in channels {
             for note in channel.notes.iter().cloned().chain(channel.passed_over()) {
                 if !self.told.contains(&note) {
-                    log::warn!("{note}");
+                    tracing::warn!(run = self.adaptor.run_id(), "{note}");
                     self.told.insert(note);
                 }
             }

@@ -58,7 +58,8 @@ impl Store {
             Err(TryLockError::WouldBlock) => return Err(JournalError::InUse { path: path.into() }),
             // Some file systems have no locks; a journal there is still better than none.
             Err(TryLockError::Error(reason)) => {
-                log::warn!("the journal {} cannot be locked: {reason}", path.display());
+                let path = path.display();
+                tracing::warn!(%path, "the journal {path} cannot be locked: {reason}");
             }
         }
         let length = file.metadata().map_err(error)?.len();
@@ -69,9 +70,10 @@ impl Store {
             }
             let end = end_of_lines(&mut file, length).map_err(error)?;
             if end < length {
-                log::warn!(
-                    "the last line of the journal {} was half-written and is cut off",
-                    path.display()
+                let path = path.display();
+                tracing::warn!(
+                    %path,
+                    "the last line of the journal {path} was half-written and is cut off"
                 );
                 file.set_len(end).map_err(error)?;
             }

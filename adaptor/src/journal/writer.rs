@@ -12,7 +12,7 @@ use std::{
 };
 
 use tombolo_pipelines::{
-    language::{CheckpointNote, JournalEntry, JournalNote, LostLines, OrderStatus},
+    language::{CheckpointNote, JournalEntry, JournalNote, LostLines, OrderStatus, RunHeader},
     limits::{WAITING, WAITING_BYTES},
 };
 
@@ -54,6 +54,8 @@ struct Shared {
     state: Mutex<Waiting>,
     changed: Condvar,
     tell: Tell,
+    /// The number of the run.
+    run: String,
 }
 
 /// A line that is not on disk yet.
@@ -94,24 +96,27 @@ impl Journal {
     /// called when the journal is lost, and when it goes on.
     pub(crate) fn open(
         path: &Path,
-        first: &JournalNote,
+        first: RunHeader,
         tell: impl Fn(Option<&str>) + Send + Sync + 'static,
     ) -> Result<Self, JournalError> {
         let mut store = Store::open(path)?;
+        let run = first.id.clone();
         store
-            .append(&line(first))
+            .append(&line(&JournalNote::Run(first)))
             .map_err(|source| JournalError::Write { path: path.into(), source })?;
-        Self::start(store, tell)
+        Self::start(store, run, tell)
     }
 
     fn start(
         store: impl Append,
+        run: String,
         tell: impl Fn(Option<&str>) + Send + Sync + 'static,
     ) -> Result<Self, JournalError> {
         let shared = Arc::new(Shared {
             state: Mutex::default(),
             changed: Condvar::new(),
             tell: Box::new(tell),
+            run,
         });
         let writing = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
@@ -165,7 +170,11 @@ impl Journal {
         shared.changed.notify_all();
         drop(state);
         if written.recv_timeout(END).is_err() {
-            log::warn!("the disk does not answer: the journal's last lines are not on it yet");
+            let run = &*shared.run;
+            tracing::warn!(
+                run,
+                "the disk does not answer: the journal's last lines are not on it yet"
+            );
         }
     }
 
@@ -255,7 +264,8 @@ impl Journal {
         while !state.has_ended {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
-                log::warn!(
+                tracing::warn!(
+                    run = &*shared.run,
                     "the journal's last {} lines are not on disk: {}",
                     state.lines.len() + state.under_way.len(),
                     state.trouble.as_deref().unwrap_or("the disk does not answer")
@@ -415,9 +425,11 @@ impl Shared {
             }
         }
         if !state.lines.is_empty() {
-            log::warn!(
-                "the journal {} lacks its last {} lines: {}",
-                store.path().display(),
+            let path = store.path().display();
+            tracing::warn!(
+                run = &*self.run,
+                %path,
+                "the journal {path} lacks its last {} lines: {}",
                 state.lines.len(),
                 state.trouble.as_deref().unwrap_or("")
             );

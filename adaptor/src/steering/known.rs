@@ -187,16 +187,8 @@ impl KnownCommands {
 
     /// How many of the orders have come to which state.
     pub(super) fn counts(&self) -> Vec<(&'static str, usize)> {
-        use OrderStatus::{Accepted, Applied, Applying, Computing, Rejected};
-        let states = [
-            ("accepted", Accepted),
-            ("computing", Computing),
-            ("applying", Applying),
-            ("applied", Applied),
-            ("rejected", Rejected),
-        ];
         let count = |status| self.orders.iter().filter(|order| order.status == status).count();
-        states.map(|(name, status)| (name, count(status))).into()
+        OrderStatus::ALL.map(|status| (status.name(), count(status))).into()
     }
 
     pub(super) fn reports(&self) -> Vec<OrderReport> {

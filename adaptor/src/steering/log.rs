@@ -14,6 +14,7 @@ use super::{
     order_report::{OrderReport, OrderStatus},
     planner::Rejection,
     room::is_urgent,
+    told::Told,
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
@@ -56,11 +57,17 @@ pub(crate) struct Log {
     state: Mutex<KnownCommands>,
     journal: Journal,
     hub: Option<Arc<Hub>>,
+    told: Told,
 }
 
 impl Log {
-    pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>) -> Self {
-        Self { state: Mutex::default(), journal, hub }
+    pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>, told: Told) -> Self {
+        Self { state: Mutex::default(), journal, hub, told }
+    }
+
+    /// The number of the run, as its events have it; `None` where another rank speaks.
+    pub(crate) fn run(&self) -> Option<&str> {
+        self.told.run()
     }
 
     /// Goes on from the commands of an earlier run.
@@ -104,7 +111,7 @@ impl Log {
         let is_known = lock(&self.state).reserve(id, command);
         self.journal.write(&accepted(id, source, command, moment));
         if !is_known {
-            self.admit(id, command, moment);
+            self.admit(id, source, command, moment);
         }
     }
 
@@ -129,7 +136,7 @@ impl Log {
         };
         let (Named::New(id) | Named::Again(id)) = named;
         self.journal.write(&accepted(&id, source, command, moment));
-        self.admit(&id, command, moment);
+        self.admit(&id, source, command, moment);
         Ok(id)
     }
 
@@ -174,16 +181,17 @@ impl Log {
         moment: Moment,
         then: impl FnOnce(bool) + Send + 'static,
     ) {
-        let entry = accepted(&id, &Source::Viewer(client), command, moment);
+        let source = Source::Viewer(client);
+        let entry = accepted(&id, &source, command, moment);
         if is_urgent(command) {
             self.journal.write(&entry);
-            self.admit(&id, command, moment);
+            self.admit(&id, &source, command, moment);
             return then(true);
         }
         let (log, command) = (Arc::clone(self), command.clone());
         self.journal.ask(&entry, move |outcome| match outcome {
             Ok(()) => {
-                log.admit(&id, &command, moment);
+                log.admit(&id, &source, &command, moment);
                 then(true);
             }
             Err(reason) => {
@@ -203,7 +211,8 @@ impl Log {
     }
 
     /// Notes and tells a command that is in the journal.
-    fn admit(&self, id: &str, command: &Command, moment: Moment) {
+    fn admit(&self, id: &str, source: &Source, command: &Command, moment: Moment) {
+        self.told.accepted(id, source, command, moment);
         match command {
             Command::Order(order) => {
                 lock(&self.state).add(id, order, moment.cycle);
@@ -221,14 +230,17 @@ impl Log {
         }
     }
 
-    /// Notes that a command that is no order took effect, or why it did not, and tells who gave it.
+    /// Notes that a command that is no order took effect, or why it did not, and tells who gave it;
+    /// `command` is its [name](Command::name).
     pub(crate) fn settle(
         &self,
+        command: &str,
         id: &str,
         source: &Source,
         moment: Moment,
         outcome: Result<(), String>,
     ) {
+        self.told.settled(command, id, source, moment, &outcome);
         self.answer(id, source, moment, &outcome);
         match outcome {
             Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, [None; 2]),
@@ -263,7 +275,7 @@ impl Log {
     /// Tells that the run ended before the turn of an order came. In the journal it stays open: a run
     /// that goes on from the checkpoint carries it out.
     pub(crate) fn leave_open(&self, id: &str) {
-        self.tell_rejected(id, &LEFT_OPEN.into());
+        self.tell_rejected(id, OrderStatus::name, &LEFT_OPEN.into());
     }
 
     /// Does what [`leave_open`](Log::leave_open) does for a command that is no order.
@@ -273,13 +285,28 @@ impl Log {
 
     /// Changes what is known of an order and tells the viewers.
     pub(crate) fn update(&self, id: &str, change: impl FnOnce(&mut OrderReport)) {
-        {
+        self.update_as(id, OrderStatus::name, change);
+    }
+
+    /// Does what [`update`](Log::update) does, where the event of a new state has another name for it.
+    fn update_as(
+        &self,
+        id: &str,
+        named: impl FnOnce(OrderStatus) -> &'static str,
+        change: impl FnOnce(&mut OrderReport),
+    ) {
+        let come_to = {
             let mut state = lock(&self.state);
             let Some(order) = state.order_mut(id) else { return };
+            let before = order.status;
             change(order);
             if order.status != OrderStatus::Accepted {
                 order.waits_for = None;
             }
+            (order.status != before).then(|| (order.status, order.reason.clone()))
+        };
+        if let Some((status, reason)) = come_to {
+            self.told.order(id, named(status), reason.as_deref());
         }
         self.tell(id);
     }
@@ -341,15 +368,35 @@ impl Log {
 
     /// Notes that an order changes nothing, and why.
     pub(crate) fn reject(&self, id: &str, moment: Moment, rejection: &Rejection) {
+        self.reject_as(id, OrderStatus::name, moment, rejection);
+    }
+
+    /// Notes that an order was taken back before it changed anything, and by whom.
+    pub(crate) fn cancel(&self, id: &str, moment: Moment, reason: String) {
+        self.reject_as(id, |_| "cancelled", moment, &reason.into());
+    }
+
+    fn reject_as(
+        &self,
+        id: &str,
+        named: impl FnOnce(OrderStatus) -> &'static str,
+        moment: Moment,
+        rejection: &Rejection,
+    ) {
         let Rejection { reason, min_scaled_jacobian, fraction, .. } = rejection;
         let numbers = [*min_scaled_jacobian, *fraction];
         self.journal(id, JournalStatus::Rejected, moment, Some(reason.clone()), numbers);
-        self.tell_rejected(id, rejection);
+        self.tell_rejected(id, named, rejection);
     }
 
-    fn tell_rejected(&self, id: &str, rejection: &Rejection) {
+    fn tell_rejected(
+        &self,
+        id: &str,
+        named: impl FnOnce(OrderStatus) -> &'static str,
+        rejection: &Rejection,
+    ) {
         let Rejection { reason, min_scaled_jacobian, fraction, seconds, .. } = rejection;
-        self.update(id, |order| {
+        self.update_as(id, named, |order| {
             order.status = OrderStatus::Rejected;
             order.reason = Some(reason.clone());
             order.min_scaled_jacobian = *min_scaled_jacobian;
@@ -398,7 +445,8 @@ impl Log {
         );
         let message = format!("order '{id}': applied, not followed: {reason}");
         self.journal(id, JournalStatus::NotFollowed, handed_out, Some(reason), [None; 2]);
-        log::warn!("{message}");
+        let (run, order) = (self.run(), id);
+        tracing::warn!(run, cycle, order, shape, "{message}");
         if let Some(hub) = &self.hub {
             let id = id.to_owned();
             hub.tell(move || json!({"error": {"message": message, "id": id}}));
@@ -416,7 +464,15 @@ impl Log {
             "shape {shape} of {shapes}, handed out at cycle {}, was the last: no call after it shows whether the solver's mesh is there",
             handed_out.cycle
         );
-        log::info!("order '{id}': applied, not confirmed: {reason}");
+        if let Some(run) = self.run() {
+            let cycle = handed_out.cycle;
+            tracing::info!(
+                run,
+                cycle,
+                order = id,
+                "order '{id}': applied, not confirmed: {reason}"
+            );
+        }
         self.journal(id, JournalStatus::NotConfirmed, handed_out, Some(reason), [None; 2]);
     }
 

@@ -26,6 +26,7 @@ mod room;
 mod stack;
 mod steerer;
 mod timed;
+mod told;
 mod worker;
 
 use std::{sync::LazyLock, time::Instant};
@@ -44,6 +45,7 @@ pub(crate) use room::Reservation;
 pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::Timed;
+pub(crate) use told::Told;
 
 /// Seconds since the first call of this function: the clock of a
 /// [`Shaper`](tombolo_deform::shape::Shaper).

@@ -70,3 +70,19 @@ pub enum OrderStatus {
     /// It changed nothing.
     Rejected,
 }
+
+impl OrderStatus {
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Accepted, Self::Computing, Self::Applying, Self::Applied, Self::Rejected];
+
+    /// The state as JSON has it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::Computing => "computing",
+            Self::Applying => "applying",
+            Self::Applied => "applied",
+            Self::Rejected => "rejected",
+        }
+    }
+}

@@ -145,11 +145,17 @@ pub(crate) struct Worker {
     plans: u64,
     done: Receiver<Done>,
     threads: Vec<JoinHandle<()>>,
+    /// The number of the run.
+    run: Option<String>,
 }
 
 impl Worker {
-    /// Starts the thread; `queue` is called whenever it is done with something.
-    pub(crate) fn start(planner: Arc<Mutex<Planner>>, queue: Arc<Queue>) -> std::io::Result<Self> {
+    /// Starts the thread of a run; `queue` is called whenever it is done with something.
+    pub(crate) fn start(
+        planner: Arc<Mutex<Planner>>,
+        queue: Arc<Queue>,
+        run: Option<&str>,
+    ) -> std::io::Result<Self> {
         let (tell, done) = channel();
         // The core that the solver has not less of is left to it.
         let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
@@ -162,7 +168,8 @@ impl Worker {
             move || pool.install(|| work(&jobs, &planner, &tell, &queue))
         };
         let thread = std::thread::Builder::new().name("tombolo-shape".into()).spawn(work)?;
-        Ok(Self { jobs, plans: 0, done, threads: vec![thread] })
+        let run = run.map(str::to_owned);
+        Ok(Self { jobs, plans: 0, done, threads: vec![thread], run })
     }
 
     /// Runs `work` beside everything else, on one more thread.
@@ -227,7 +234,11 @@ impl Drop for Worker {
             if Instant::now() >= until {
                 // What it is at cannot be given up, such as the set-up of an operator. It hands
                 // nothing to anybody any more, and ends with the process at the latest.
-                log::warn!("a thread that finds shapes is still at work; it is left behind");
+                let run = self.run.as_deref();
+                tracing::warn!(
+                    run,
+                    "a thread that finds shapes is still at work; it is left behind"
+                );
                 return;
             }
             std::thread::sleep(Duration::from_millis(1));

@@ -22,6 +22,7 @@ use tokio_tungstenite::{
     },
 };
 use tombolo_pipelines::language::{RelayAddress, RunName, StreamServer};
+use tracing::debug;
 
 use super::{
     StreamError,
@@ -34,6 +35,7 @@ use super::{
     tls::machine,
 };
 use crate::{
+    client::Link,
     dial::{Stream, connect, dial, encrypt},
     lock::lock,
 };
@@ -56,6 +58,8 @@ const ADDRESS: usize = 1024;
 
 /// A run's place at a relay.
 pub(super) struct Connect {
+    /// The number of the run.
+    run: Option<Arc<str>>,
     relay: Arc<RelayAddress>,
     /// The relay's secret for runs.
     secret: Secret,
@@ -81,7 +85,10 @@ struct Lost {
 
 impl Connect {
     /// The place that the settings ask for, if they do.
-    pub(super) fn of(settings: &StreamServer) -> Result<Option<Arc<Self>>, StreamError> {
+    pub(super) fn of(
+        settings: &StreamServer,
+        run: Option<&str>,
+    ) -> Result<Option<Arc<Self>>, StreamError> {
         let Some(relay) = &settings.connect else { return Ok(None) };
         let secret = relay_secret(settings)?;
         let name = match &settings.name {
@@ -94,8 +101,8 @@ impl Connect {
         let instance = Secret::random().map_err(StreamError::Token)?;
         let state = State { attached, is_connected: false, is_given_up: false };
         let (state, changed) = (Mutex::new(state), Condvar::new());
-        let relay = Arc::new(relay.clone());
-        Ok(Some(Arc::new(Self { relay, secret, instance, state, changed })))
+        let (run, relay) = (run.map(Into::into), Arc::new(relay.clone()));
+        Ok(Some(Arc::new(Self { run, relay, secret, instance, state, changed })))
     }
 
     /// The address of the relay.
@@ -125,7 +132,9 @@ impl Connect {
         loop {
             let Lost { reason, was_connected } = match self.join().await {
                 Ok((socket, attached)) => {
-                    log::info!("this run is {} at the relay {}", attached.name, self.relay);
+                    let (run, name) = (self.run.as_deref(), &attached.name);
+                    let address = &self.relay;
+                    tracing::info!(run, %name, %address, "this run is {name} at the relay {address}");
                     let is_new = self.connected(&attached);
                     if is_new {
                         renamed();
@@ -140,9 +149,12 @@ impl Connect {
                 (pause, is_reported) = (FIRST_PAUSE, false);
             }
             if !std::mem::replace(&mut is_reported, true) {
-                log::warn!(
-                    "the relay {} is not reached, and it is tried again and again: {reason}",
-                    self.relay
+                let (run, address) = (self.run.as_deref(), &self.relay);
+                tracing::warn!(
+                    run,
+                    %address,
+                    reason,
+                    "the relay {address} is not reached, and it is tried again and again: {reason}"
                 );
             }
             sleep(varied(pause)).await;
@@ -194,9 +206,12 @@ impl Connect {
             };
             let attached: Attached =
                 serde_json::from_str(&text).map_err(|_| "it is no relay".to_owned())?;
-            // It stands in links, which people and programs are given.
+            // They stand in links, which people and programs are given.
             if !is_address(&attached.address) {
                 return Err("it gives this run an address that none can have".into());
+            }
+            if !attached.sha256.as_deref().is_none_or(is_fingerprint) {
+                return Err("it gives this run a certificate's fingerprint that is none".into());
             }
             Ok((socket, attached))
         };
@@ -234,8 +249,8 @@ impl Connect {
                 dials.spawn(async move {
                     match timeout(ANSWER, carry(&relay, &secret, &open)).await {
                         Ok(Ok(accepted)) => entrance.take(accepted, way).await,
-                        Ok(Err(reason)) => log::debug!("no connection for a viewer: {reason}"),
-                        Err(_) => log::debug!("no connection for a viewer: the relay is silent"),
+                        Ok(Err(reason)) => debug!("no connection for a viewer: {reason}"),
+                        Err(_) => debug!("no connection for a viewer: the relay is silent"),
                     }
                 });
             }
@@ -294,6 +309,12 @@ fn is_address(text: &str) -> bool {
         && text.chars().all(is_plain)
         && text.ends_with('/')
         && rest.is_some_and(|rest| !rest.starts_with('/'))
+        && format!("{text}?token=x").parse::<Link>().is_ok()
+}
+
+/// Whether a text is the SHA-256 fingerprint of a certificate.
+fn is_fingerprint(text: &str) -> bool {
+    text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit())
 }
 
 /// Why a relay does not let a run in.
@@ -344,10 +365,21 @@ mod tests {
         for address in ["https://relay.host:7400/nozzle/", "http://[::1]:7400/nozzle-2/"] {
             assert!(is_address(address), "{address}");
         }
-        for text in
-            ["", "https:///", "https://relay/run", "ftp://relay/", "https://relay/?token=x/"]
-        {
+        for text in [
+            "",
+            "https:///",
+            "https://relay/run",
+            "ftp://relay/",
+            "https://relay/?token=x/",
+            "https://relay:0/",
+            "https://name@relay/",
+            "https://[relay]/",
+        ] {
             assert!(!is_address(text), "{text}");
+        }
+        assert!(is_fingerprint(&"0a".repeat(32)));
+        for text in ["", "0a", &"0g".repeat(32), "\ndrive: https://elsewhere/?token=x"] {
+            assert!(!is_fingerprint(text), "{text}");
         }
     }
 

@@ -71,7 +71,7 @@ pub(super) async fn guard(
         None => next.run(request).await,
         Some(answer) => answer,
     };
-    if shared.gate.log_refusal(&connection, &response) {
+    if shared.gate.log_refusal(shared.hub.run(), &connection, &response) {
         let address = connection.address().to_string();
         shared.commands.note(JournalNote::Refused(RefusedRequest { address }));
     }
@@ -128,16 +128,22 @@ impl Gate {
             .map(|reason| (StatusCode::FORBIDDEN, reason).into_response())
     }
 
-    /// Logs a refusal, once in a while for each address; whether it did.
-    pub(super) fn log_refusal(&self, connection: &Connection, response: &Response) -> bool {
+    /// Logs a refusal of a run, or of a relay, once in a while for each address; whether it did.
+    pub(super) fn log_refusal(
+        &self,
+        run: Option<&str>,
+        connection: &Connection,
+        response: &Response,
+    ) -> bool {
         let reason = match response.status() {
             StatusCode::UNAUTHORIZED => "it showed no secret that is known here",
             StatusCode::FORBIDDEN => "it came under a foreign name or from a page of another site",
             _ => return false,
         };
-        let is_new = self.refusals.is_to_be_logged(connection.address());
+        let address = connection.address();
+        let is_new = self.refusals.is_to_be_logged(address);
         if is_new {
-            log::warn!("a request from {} was refused: {reason}", connection.address());
+            tracing::warn!(run, %address, reason, "a request from {address} was refused: {reason}");
         }
         is_new
     }

@@ -151,6 +151,8 @@ pub(crate) struct Hub {
     pub(crate) clock: Arc<Clock>,
     counters: Counters,
     arrivals: AtomicU64,
+    /// The number of the run, where one is shown.
+    run: Option<Arc<str>>,
 }
 
 /// The name of a viewer in messages.
@@ -160,6 +162,16 @@ pub(super) fn name(client: u64) -> String {
 
 /// Said by the solver's side.
 impl Hub {
+    /// The hub of the run of a number.
+    pub(crate) fn new(run: Arc<str>) -> Self {
+        Self { run: Some(run), ..Self::default() }
+    }
+
+    /// The number of the run, where one is shown.
+    pub(crate) fn run(&self) -> Option<&str> {
+        self.run.as_deref()
+    }
+
     /// The name of a viewer in messages and in the journal.
     pub(crate) fn name(client: u64) -> String {
         format!("c{client}")

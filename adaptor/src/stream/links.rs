@@ -169,7 +169,8 @@ impl Links {
         if let Some(path) = path
             && let Err(error) = self.write(path.clone())
         {
-            log::warn!("the links were not written to {}: {error}", path.display());
+            let path = path.display();
+            tracing::warn!(%path, "the links were not written to {path}: {error}");
         }
     }
 }

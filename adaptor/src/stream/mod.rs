@@ -230,7 +230,7 @@ impl Server {
         commands: Arc<dyn CommandSink>,
         playback: Option<Arc<playback::Shown>>,
     ) -> Result<Self, StreamError> {
-        let relay = Connect::of(settings)?;
+        let relay = Connect::of(settings, hub.run())?;
         let bind = |listen: Listen| {
             Socket::bind(&listen).map_err(|source| match source.kind() {
                 std::io::ErrorKind::AddrInUse => StreamError::InUse { address: listen },
@@ -343,7 +343,9 @@ fn went_wrong(what: &'static str, act: impl FnOnce()) -> bool {
         let mut reported = lock(&REPORTED);
         if !reported.contains(&what) {
             reported.push(what);
-            log::error!("the {what} of the stream failed, which is a fault of Tombolo; it goes on");
+            tracing::error!(
+                "the {what} of the stream failed, which is a fault of Tombolo; it goes on"
+            );
         }
         drop(reported);
         // Whatever it was must not happen without a pause.
@@ -367,7 +369,7 @@ fn serve_until_stopped(
             Ok(listening) => {
                 runtime.block_on(serve(listening, ways, shared.clone(), &mut stopped));
             }
-            Err(error) => log::error!("the server of the stream cannot go on: {error}"),
+            Err(error) => tracing::error!("the server of the stream cannot go on: {error}"),
         }
     }) && !shared.hub.is_closed()
     {}

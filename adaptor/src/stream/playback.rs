@@ -114,7 +114,7 @@ impl Shown {
                 let player = Recording::open(&file).map_err(|error| error.to_string());
                 match player.map(|recording| Player::new(recording, messages, said, decoded)) {
                     Ok(mut player) => player.run(),
-                    Err(reason) => log::warn!("{reason}"),
+                    Err(reason) => tracing::warn!(path = %file.display(), "{reason}"),
                 }
             }
         };
@@ -321,7 +321,8 @@ impl Player {
                 Seek::Cycle(cycle) => self.recording.seconds_of_cycle(cycle),
                 Seek::Time(time) => self.recording.seconds_of_time(time),
             };
-            self.go_to(seconds.clamp(first, last))?;
+            // A damaged file may have them the wrong way round.
+            self.go_to(seconds.max(first).min(last))?;
         }
         self.tell()
     }

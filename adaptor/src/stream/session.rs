@@ -14,6 +14,7 @@ use serde_json::json;
 use tombolo_pipelines::language::{
     JournalNote, LinkFor, Message as Said, Together, ViewerMove, ViewerNote, Wheel, parse_message,
 };
+use tracing::info;
 
 use super::{
     CommandSink, PING_PERIOD, Shared,
@@ -66,9 +67,18 @@ impl Seat<'_> {
     /// been too much of it of late.
     fn note(&self, did: ViewerMove) {
         let Ok(left_out) = self.lines.take(self.client.access) else { return };
+        let (viewer, address) = (Hub::name(self.client.id), self.address);
+        let (run, cycle) = (self.hub.run(), self.hub.clock.get().cycle);
+        let what = match did {
+            ViewerMove::Came => "has come",
+            ViewerMove::Left => "has left",
+            ViewerMove::TookDrivingLink => "took a link for driving",
+            ViewerMove::TookWatchingLink => "took a link for watching",
+        };
+        info!(run, cycle, viewer, %address, "the viewer {viewer} from {address} {what}");
         self.commands.note(JournalNote::Viewer(ViewerNote {
-            name: Hub::name(self.client.id),
-            address: self.address.to_string(),
+            name: viewer,
+            address: address.to_string(),
             called: self.hub.called(self.client.id),
             may_drive: self.client.access == Access::Drive,
             did,

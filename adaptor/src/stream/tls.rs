@@ -103,7 +103,8 @@ impl Identity {
         let is_open = !address.ip().is_loopback();
         if settings.tls.is_none() && (!is_open || settings.insecure) {
             if is_open {
-                log::warn!(
+                tracing::warn!(
+                    %address,
                     "viewers reach {address} from other machines, and what they send and see can be \
                      read on the way, because `stream.insecure` says so"
                 );

@@ -101,7 +101,7 @@ enum tombolo_cell_type
   TOMBOLO_PYRAMID = 14
 };
 
-/* How much is told. */
+/* How much is told: what went wrong; from TOMBOLO_LOG_INFO on also each step of an order, what was commanded and who watches. */
 enum tombolo_level
 {
   TOMBOLO_LOG_OFF = 0,

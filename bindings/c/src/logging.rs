@@ -25,21 +25,21 @@ impl UserData {
 
 fn number(level: Level) -> c_int {
     match level {
-        Level::Error => 1,
-        Level::Warn => 2,
-        Level::Info => 3,
-        Level::Debug | Level::Trace => 4,
+        Level::ERROR => 1,
+        Level::WARN => 2,
+        Level::INFO => 3,
+        _ => 4,
     }
 }
 
 export! {
     fn tombolo_log(level: c_int, function: Option<Function>, user_data: *mut c_void) {
         let most = match level {
-            0 => LevelFilter::Off,
-            1 => LevelFilter::Error,
-            2 => LevelFilter::Warn,
-            3 => LevelFilter::Info,
-            4 => LevelFilter::Debug,
+            0 => LevelFilter::OFF,
+            1 => LevelFilter::ERROR,
+            2 => LevelFilter::WARN,
+            3 => LevelFilter::INFO,
+            4 => LevelFilter::DEBUG,
             other => return Err(Fault::invalid("log", format!("the level {other}"), "one of enum tombolo_level")),
         };
         let sink = function.map(|function| -> logging::Sink {

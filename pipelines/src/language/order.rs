@@ -168,6 +168,20 @@ pub struct Cancel {
 }
 
 impl Command {
+    /// The key by which JSON knows the command.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Command::Order(_) => "order",
+            Command::Pause {} => "pause",
+            Command::Resume {} => "resume",
+            Command::Stop {} => "stop",
+            Command::Parameter(_) => "parameter",
+            Command::Pipelines(_) => "pipelines",
+            Command::Cancel(_) => "cancel",
+        }
+    }
+
     /// The first edit of an order that names a file, and the file.
     #[must_use]
     pub fn file(&self) -> Option<(usize, &str)> {

@@ -46,7 +46,7 @@ impl Desk {
         let store = Disk { answers, written: Arc::clone(&written) };
         let tells = Arc::clone(&told);
         let tell = move |reason: Option<&str>| lock(&tells).push(reason.map(str::to_owned));
-        let journal = Journal::start(store, tell).unwrap();
+        let journal = Journal::start(store, String::new(), tell).unwrap();
         let (answer, answers) = channel();
         Self { journal, disk, written, told, answer, answers }
     }
@@ -295,7 +295,8 @@ fn whoever_waits_for_a_line_may_be_the_last_to_hold_the_journal() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("journal.jsonl");
     let (go, gone) = channel::<()>();
-    let journal = Arc::new(Journal::start(Store::open(&path).unwrap(), |_| {}).unwrap());
+    let journal =
+        Arc::new(Journal::start(Store::open(&path).unwrap(), String::new(), |_| {}).unwrap());
     let last = Arc::clone(&journal);
     journal.ask(&entry("o1"), move |_| {
         let _ = gone.recv();

@@ -119,7 +119,8 @@ impl Steerer {
         }
         let in_advance = shaper.skeleton_in_advance().filter(|_| skeleton);
         let mut steerer = Self::of_shaper(shaper, defaults, log);
-        steerer.worker = Some(Worker::start(Arc::clone(&steerer.planner), queue)?);
+        let run = steerer.log.run();
+        steerer.worker = Some(Worker::start(Arc::clone(&steerer.planner), queue, run)?);
         steerer.skeleton = in_advance.map(|extract| Box::new(extract) as Box<_>);
         Ok(steerer)
     }
@@ -136,7 +137,8 @@ impl Steerer {
                 worker.prepare(self.defaults.deform.clone());
                 if let Some(Err(error)) = self.skeleton.take().map(|extract| worker.beside(extract))
                 {
-                    log::warn!("the first drag will extract the skeleton: {error}");
+                    let run = self.log.run();
+                    tracing::warn!(run, "the first drag will extract the skeleton: {error}");
                 }
             }
             None if self.domain.communicator().size() > 1 => {
@@ -550,7 +552,7 @@ mod tests {
     use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
 
     use super::*;
-    use crate::journal::Journal;
+    use crate::{journal::Journal, steering::Told};
 
     /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
     #[test]
@@ -558,7 +560,7 @@ mod tests {
         let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
         let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
         let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
-        let log = Arc::new(Log::new(Journal::none(), None));
+        let log = Arc::new(Log::new(Journal::none(), None, Told::default()));
         let steerer =
             Steerer::new(shaper, Defaults::default(), log, Arc::default(), false).unwrap();
         let planner = Arc::clone(&steerer.planner);

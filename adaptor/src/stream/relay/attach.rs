@@ -30,6 +30,8 @@ use crate::stream::{
 const INTRODUCTION: Duration = Duration::from_secs(5);
 /// The code of a connection that ends because the run cannot be taken in.
 const REFUSED: u16 = 1008;
+/// Bytes that the reason in a close frame may have.
+const REASON: usize = 123;
 
 /// Takes a run in that has shown the secret for runs.
 pub(super) async fn attach(
@@ -51,11 +53,20 @@ pub(super) async fn attach(
     upgrade.on_upgrade(move |mut socket| async move {
         connection.upgraded();
         if let Err(reason) = keep(&mut socket, &relay, &connection, &host).await {
-            log::warn!("a run from {} was not taken in: {reason}", connection.address());
-            let close = CloseFrame { code: REFUSED, reason: reason.into() };
+            let address = connection.address();
+            tracing::warn!(%address, reason, "a run from {address} was not taken in: {reason}");
+            let close = CloseFrame { code: REFUSED, reason: fitting(&reason).into() };
             let _ = socket.send(Message::Close(Some(close))).await;
         }
     })
+}
+
+/// The beginning of a reason that a close frame has room for. A longer one would be no frame, and the
+/// run would never read why.
+fn fitting(reason: &str) -> &str {
+    let ends = reason.char_indices().map(|(at, c)| at + c.len_utf8());
+    let end = ends.take_while(|&end| end <= REASON).last().unwrap_or_default();
+    reason.get(..end).unwrap_or_default()
 }
 
 fn for_runs_only() -> Response {
@@ -84,7 +95,8 @@ async fn keep(
         .attach(&name, instance, connection.address())
         .ok_or_else(|| format!("{RUNS} runs are connected already"))?;
     let run = Seat { relay, run };
-    log::info!("the run {} has connected from {}", run.run.name, connection.address());
+    let (name, address) = (&run.run.name, connection.address());
+    tracing::info!(%name, %address, "the run {name} has connected from {address}");
     let attached = Attached {
         address: format!("{}/{}/", relay.base(host), run.run.name),
         name: run.run.name.clone(),
@@ -131,7 +143,8 @@ struct Seat<'a> {
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
         self.relay.runs.leave(&self.run);
-        log::info!("the run {} has left", self.run.name);
+        let name = &self.run.name;
+        tracing::info!(%name, "the run {name} has left");
     }
 }
 
@@ -165,4 +178,16 @@ pub(super) async fn carry(
     headers.insert(header::CONNECTION, HeaderValue::from_static("upgrade"));
     headers.insert(header::UPGRADE, HeaderValue::from_static(PROTOCOL));
     response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_fits_into_a_close_frame() {
+        assert_eq!(fitting("short"), "short");
+        assert_eq!(fitting(&"x".repeat(500)).len(), REASON);
+        assert_eq!(fitting(&"é".repeat(500)), "é".repeat(61));
+    }
 }

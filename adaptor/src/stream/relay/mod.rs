@@ -213,7 +213,7 @@ impl Relay {
                         _ = stopped => {}
                     }
                 }),
-                Err(error) => log::error!("the relay cannot listen: {error}"),
+                Err(error) => tracing::error!("the relay cannot listen: {error}"),
             }
         };
         let thread = std::thread::Builder::new().name("tombolo-relay".into()).spawn(serving);
@@ -330,7 +330,7 @@ async fn guard(
         None => next.run(request).await,
     };
     if is_own || is_answered {
-        relay.gate.log_refusal(&connection, &response);
+        relay.gate.log_refusal(None, &connection, &response);
         gate::add_headers(&mut response);
     }
     response

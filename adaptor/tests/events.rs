@@ -1,0 +1,187 @@
+//! What a run tells of itself by events of `tracing`, to a subscriber of the host.
+
+mod common;
+
+use std::{
+    collections::BTreeMap,
+    fmt::Debug,
+    sync::{Mutex, Once, PoisonError},
+};
+
+use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Settings,
+    logging::{self, LevelFilter, LoggingError},
+    pipelines::language::parse_orders,
+};
+use tracing::{
+    Event, Level, Metadata, Subscriber,
+    field::{Field, Visit},
+    span,
+};
+
+/// The fields of an event as text, and its level.
+#[derive(Debug, Clone, Default)]
+struct Told(BTreeMap<String, String>);
+
+impl Told {
+    fn get(&self, name: &str) -> &str {
+        self.0.get(name).map_or("", String::as_str)
+    }
+}
+
+impl Visit for Told {
+    fn record_debug(&mut self, field: &Field, value: &dyn Debug) {
+        self.0.insert(field.name().into(), format!("{value:?}"));
+    }
+
+    fn record_str(&mut self, field: &Field, value: &str) {
+        self.0.insert(field.name().into(), value.into());
+    }
+}
+
+/// The host's own subscriber, which keeps what all threads tell.
+struct Keeping;
+
+static KEPT: Mutex<Vec<Told>> = Mutex::new(Vec::new());
+
+impl Subscriber for Keeping {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.target().starts_with("tombolo")
+    }
+
+    fn event(&self, event: &Event<'_>) {
+        let mut told = Told::default();
+        event.record(&mut told);
+        told.0.insert("level".into(), event.metadata().level().to_string());
+        KEPT.lock().unwrap_or_else(PoisonError::into_inner).push(told);
+    }
+
+    fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+
+    fn record(&self, _: &span::Id, _: &span::Record<'_>) {}
+
+    fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+
+    fn enter(&self, _: &span::Id) {}
+
+    fn exit(&self, _: &span::Id) {}
+}
+
+fn listen() {
+    static LISTENS: Once = Once::new();
+    LISTENS.call_once(|| tracing::subscriber::set_global_default(Keeping).expect("no other"));
+}
+
+/// The events of a run so far in which a field is so.
+fn told(run: &str, field: &str, value: &str) -> Vec<Told> {
+    let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let fits = |told: &&Told| told.get("run") == run && told.get(field) == value;
+    kept.iter().filter(fits).cloned().collect()
+}
+
+fn statuses(told: &[Told]) -> Vec<&str> {
+    told.iter().map(|told| told.get("status")).collect()
+}
+
+fn solver(orders: &Value) -> Solver {
+    let orders = parse_orders(&orders.to_string(), "orders.json").expect("orders");
+    Solver::new(Settings { orders, ..Settings::default() })
+}
+
+/// Two runs in one process, at cycles of their own.
+#[test]
+fn each_step_of_an_order_is_told_with_its_run_cycle_and_id() {
+    listen();
+    let mut order = squeeze(0.2);
+    order["schedule"] = json!({"steps": 2});
+    let unknown = json!({"edits": [{"translate": {"features": ["nowhere"], "by": [0, 0, 1]}}]});
+    let mut solvers = [2_u64, 4].map(|cycle| {
+        let orders = json!([
+            {"id": "a", "at": {"cycle": cycle}, "order": order},
+            {"id": "b", "at": {"cycle": cycle + 4}, "order": {"undo": 1}},
+            {"id": "c", "at": {"cycle": cycle + 6}, "order": unknown},
+        ]);
+        (solver(&orders), cycle)
+    });
+    for _ in 0..20 {
+        solvers.iter_mut().for_each(|(solver, _)| solver.step());
+    }
+    let runs: Vec<String> =
+        solvers.iter().map(|(solver, _)| solver.adaptor.run_id().to_owned()).collect();
+    assert_ne!(runs[0], runs[1]);
+    for ((solver, cycle), run) in solvers.into_iter().zip(runs) {
+        let whole = ["accepted", "computing", "applying", "applied"];
+        for (id, at) in [("a", cycle), ("b", cycle + 4)] {
+            let steps = told(&run, "order", id);
+            assert_eq!(statuses(&steps), whole, "{steps:?}");
+            let cycles: Vec<u64> =
+                steps.iter().map(|it| it.get("cycle").parse().expect("a cycle")).collect();
+            assert_eq!(cycles[..3], [at; 3], "{steps:?}");
+            assert!(cycles[3] >= at && cycles[3] < at + 4, "{steps:?}");
+            assert_eq!(steps[0].get("undo"), if id == "b" { "1" } else { "" });
+            assert_eq!(steps[1].get("level"), Level::DEBUG.as_str());
+            assert!(steps.iter().all(|it| it.get("message").starts_with(&format!("order '{id}'"))));
+        }
+        let refused = told(&run, "order", "c");
+        let last = refused.last().expect("its outcome");
+        assert_eq!((last.get("status"), last.get("level")), ("rejected", "INFO"));
+        assert!(last.get("reason").contains("nowhere"), "{last:?}");
+        // Nothing was due any more.
+        let last = told(&run, "run", &run).len();
+        assert!(told(&run, "cycle", "19").is_empty());
+        solver.finish();
+        assert_eq!(told(&run, "run", &run).len(), last);
+    }
+    // The host has a subscriber: the library's own takes no place.
+    logging::start();
+    let taken = logging::send_to(LevelFilter::WARN, None);
+    assert!(matches!(taken, Err(LoggingError::OtherLogger)));
+}
+
+/// What the threads of the stream and the journal tell has the run too.
+#[test]
+fn viewers_commands_and_checkpoints_are_told_with_their_run() {
+    listen();
+    let directory = tempfile::tempdir().expect("a directory");
+    let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    settings.config.journal = Some("journal.jsonl".into());
+    settings.output = directory.path().into();
+    let mut solver = Solver::new(settings);
+    let run = solver.adaptor.run_id().to_owned();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step();
+    viewer.send(&json!({"id": "x", "order": squeeze(0.2)}));
+    viewer.wait_for("order", |order| order["id"] == "x");
+    viewer.send(&json!({"id": "y", "cancel": {"order": "x"}}));
+    viewer.send(&json!({"id": "p", "pause": {}}));
+    viewer.send(&json!({"id": "r", "resume": {}}));
+    // The answer to what comes behind them says that they are in the queue.
+    viewer.send_text("nonsense");
+    viewer.wait_for("error", |_| true);
+    solver.step();
+    assert_eq!(statuses(&told(&run, "order", "x")), ["accepted", "cancelled"]);
+    assert_eq!(told(&run, "order", "x")[0].get("viewer"), "c1");
+    for (id, command) in [("y", "cancel"), ("p", "pause"), ("r", "resume")] {
+        let [taken, done] = &told(&run, "id", id)[..] else { panic!("{:?}", told(&run, "id", id)) };
+        assert_eq!((taken.get("level"), done.get("level")), ("DEBUG", "INFO"));
+        for it in [taken, done] {
+            assert_eq!((it.get("command"), it.get("viewer")), (command, "c1"), "{it:?}");
+        }
+        assert_eq!(done.get("cycle"), "1");
+    }
+    let file = directory.path().join("run.checkpoint");
+    solver.adaptor.write_checkpoint(&file).expect("written");
+    let written = told(&run, "path", &file.display().to_string());
+    assert_eq!((written.len(), written[0].get("cycle")), (1, "1"));
+    solver.finish();
+    let seen = told(&run, "viewer", "c1");
+    let seen: Vec<_> = seen.iter().filter(|it| it.get("address") == "127.0.0.1").collect();
+    assert_eq!(seen.len(), 2, "{seen:?}");
+    assert!(seen[0].get("message").contains("has come"), "{seen:?}");
+    assert!(seen[1].get("message").contains("has left"), "{seen:?}");
+}
