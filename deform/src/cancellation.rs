@@ -5,8 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Whether work under way is to be given up. Its clones are the same; any thread may ask.
 ///
-/// Work that looks at it stops at its next look, which is some milliseconds away on a mesh of a
-/// million cells, and leaves nothing half-done. Ranks do not tell each other: work of several is
+/// Work that looks at it stops at its next look, and leaves nothing half-done. In the iterations of a
+/// solve and the checks of a mesh that is some milliseconds away, on a mesh of a million cells. A
+/// step of a set-up is finished first: the order of the cells, an assembly, the levels of multigrid,
+/// a factor; so are the sweeps that improve a shape. Ranks do not tell each other: work of several is
 /// given up by all or by none.
 ///
 /// ```

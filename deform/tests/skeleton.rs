@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 
+use tombolo_deform::cancellation::Cancellation;
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes;
@@ -380,4 +381,14 @@ fn noisy(point: Vector, vertex: usize, seed: u64, size: f64) -> Vector {
         state ^= state << 17;
         value + size * ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
     })
+}
+
+#[test]
+fn a_skeleton_that_is_given_up_is_none() {
+    let torus = shapes::torus(1.0, 0.3, [60, 24]);
+    let surface = Surface::extract(&torus, &FeatureSettings::default()).unwrap();
+    let (settings, cancellation) = (SkeletonSettings::default(), Cancellation::default());
+    cancellation.cancel();
+    let found = Skeleton::extract_unless(&surface, &settings, &cancellation);
+    assert_eq!(found.err(), Some(SkeletonError::Cancelled));
 }

@@ -12,7 +12,7 @@ use tombolo::deform::features::FeatureSettings;
 use tombolo::deform::mesh::{Mesh, Vector};
 use tombolo::deform::quality::{quality, scaled_jacobians};
 use tombolo::deform::shape::{Refused, Request};
-use tombolo::deform::skeleton::{Skeleton, SkeletonSettings};
+use tombolo::deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
 use tombolo::deform::surface::{Surface, SurfaceError};
 use tombolo::pipelines::files::read_displacements;
 use tombolo::pipelines::language::Change;
@@ -215,7 +215,13 @@ impl Shaper {
     fn skeleton<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let found = guarded(|| {
             py.detach(|| {
-                Skeleton::extract(&self.surface, &SkeletonSettings::default()).map_err(mistake)
+                let settings = SkeletonSettings::default();
+                Skeleton::extract_unless(&self.surface, &settings, &self.cancellation).map_err(
+                    |error| match error {
+                        SkeletonError::Cancelled => RejectedError::new_err(error.to_string()),
+                        error => mistake(error),
+                    },
+                )
             })
         })?;
         let dict = PyDict::new(py);

@@ -272,3 +272,31 @@ def test_a_mesh_of_two_coordinates_stays_in_its_plane():
                 points[:] = steering.motion.coordinates
     assert [order["status"] for order in adaptor.report["orders"]] == ["rejected", "applied"]
     assert "along z" in adaptor.report["orders"][0]["reason"]
+
+
+@pytest.mark.parametrize("work", ["skeleton", "displacement", "shape"])
+def test_work_of_each_kind_is_given_up(work):
+    points, tets = box(12)
+    shaper = shaper_of(points * [1, 1, 5], tets, ends(points, tets))
+    edits = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, 0.1], "harmonic_order": 3}}]
+    calls = {
+        "skeleton": lambda progress: shaper.skeleton(progress=progress),
+        "displacement": lambda progress: shaper.displacement(edits, progress=progress),
+        "shape": lambda progress: shaper.shape(edits, progress=progress),
+    }
+    # Whatever it is at: the first look finds it cancelled.
+    renew = shaper._shaper.renew
+
+    class Cancelled:
+        def __getattr__(self, name):
+            return getattr(native, name)
+
+        def renew(self):
+            renew()
+            native.cancel()
+
+    native, shaper._shaper = shaper._shaper, Cancelled()
+    with pytest.raises(tombolo.RejectedError, match="given up"):
+        calls[work](None)
+    shaper._shaper = native
+    assert calls[work](None) is not None

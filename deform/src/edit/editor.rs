@@ -9,6 +9,7 @@ use super::kept_layers::{Followed, KeptLayer, KeptLayers, without_amount};
 use super::kinds::Edit;
 use super::motion::{self, Motion};
 use super::skeleton::SkeletonEditor;
+use crate::cancellation::Cancellation;
 use crate::harmonic::{HarmonicOrder, Laplacian, NotFactored, Polyharmonic};
 use crate::mesh::Vector;
 use crate::skeleton::{Skeleton, SkeletonError, SkinError};
@@ -103,6 +104,7 @@ pub struct Editor {
     /// Rim vertices with the same coordinates.
     seams: Vec<[u32; 2]>,
     layers: KeptLayers,
+    cancellation: Cancellation,
 }
 
 impl Editor {
@@ -129,7 +131,20 @@ impl Editor {
             skeletons,
             seams,
             layers: KeptLayers::default(),
+            cancellation: Cancellation::default(),
         })
+    }
+
+    /// The editor with what has its work given up: that is looked at before each edit, each factor
+    /// and each step of the extraction of a skeleton. A factor that was begun is finished.
+    #[must_use]
+    pub fn with_cancellation(self, cancellation: Cancellation) -> Self {
+        let skeletons = self.skeletons.with_cancellation(cancellation.clone());
+        Self { skeletons, cancellation, ..self }
+    }
+
+    fn require_wanted(&self) -> Result<(), EditError> {
+        if self.cancellation.is_cancelled() { Err(EditError::Cancelled) } else { Ok(()) }
     }
 
     /// The surface.
@@ -255,6 +270,7 @@ impl Editor {
     ) -> Result<(), EditError> {
         let mut shared: Option<Arc<[Edit]>> = None;
         for (index, edit) in stack.iter().enumerate().skip(from) {
+            self.require_wanted()?;
             let mut layer = layers.remove(&index).unwrap_or_else(|| {
                 let stack = Arc::clone(shared.get_or_insert_with(|| stack.into()));
                 KeptLayer { stack, index, below: displacement.to_vec(), followed: None }
@@ -453,12 +469,14 @@ impl Editor {
             }
         }
         let prescribed: Vec<bool> = handle.roles.iter().map(|role| *role != Role::Free).collect();
+        self.require_wanted()?;
         self.choose_operator(order, prescribed).map_err(|reason| EditError::NotSolvable {
             edit: index,
             name: edit.name(),
             order,
             reason,
         })?;
+        self.require_wanted()?;
         if let Some(operator) = self.operators.last() {
             operator.solve(&self.laplacians[operator.level()], &self.parts, &mut fields);
         }

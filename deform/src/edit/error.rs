@@ -7,6 +7,7 @@ use crate::features::UnknownFeature;
 use crate::harmonic::HarmonicOrder;
 use crate::mesh::Vector;
 use crate::number::Number;
+use crate::skeleton::SkeletonError;
 use crate::vector::Position;
 
 /// An error of an edit, whatever the surface.
@@ -300,6 +301,9 @@ pub enum EditError {
         /// Why.
         reason: String,
     },
+    /// It was given up: see [`Editor::with_cancellation`](super::Editor::with_cancellation).
+    #[error("it was given up before its displacement was known")]
+    Cancelled,
 }
 
 /// Where a surface is that has nothing in a region.
@@ -328,6 +332,9 @@ impl std::fmt::Display for Surroundings {
 
 impl EditError {
     pub(super) fn skeleton(edit: usize, source: SkeletonEditError) -> Self {
-        Self::Skeleton { edit, source: Box::new(source) }
+        match source {
+            SkeletonEditError::Extraction(SkeletonError::Cancelled) => Self::Cancelled,
+            source => Self::Skeleton { edit, source: Box::new(source) },
+        }
     }
 }

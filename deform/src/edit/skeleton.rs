@@ -1,9 +1,10 @@
 //! Skeleton edits: from points near the skeleton to the motion of a surface.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::kinds::SkeletonEdit;
 use crate::bounds::Bounds;
+use crate::cancellation::Cancellation;
 use crate::mesh::Vector;
 use crate::number::Number;
 use crate::skeleton::{
@@ -25,12 +26,16 @@ const NEAR: f64 = 0.02;
 pub(super) struct SkeletonEditor {
     surface: Arc<Surface>,
     /// Shared with whoever extracts it in advance.
-    skeleton: Arc<OnceLock<Result<Arc<Skeleton>, SkeletonError>>>,
+    skeleton: Arc<Mutex<Extracted>>,
+    cancellation: Cancellation,
     /// How far from each node of the skeleton a point may be that names it.
     near: Vec<f64>,
     /// The most recently used at the end.
     skins: Vec<Bound>,
 }
+
+/// The skeleton of a surface, or why it has none; `None` before it was extracted.
+type Extracted = Option<Result<Arc<Skeleton>, SkeletonError>>;
 
 #[derive(Debug)]
 struct Bound {
@@ -42,19 +47,30 @@ struct Bound {
 
 impl SkeletonEditor {
     pub fn new(surface: Arc<Surface>) -> Self {
-        Self { surface, skeleton: Arc::default(), near: Vec::new(), skins: Vec::new() }
+        Self {
+            surface,
+            skeleton: Arc::default(),
+            cancellation: Cancellation::default(),
+            near: Vec::new(),
+            skins: Vec::new(),
+        }
+    }
+
+    /// The editor with what has an extraction given up.
+    pub fn with_cancellation(self, cancellation: Cancellation) -> Self {
+        Self { cancellation, ..self }
     }
 
     /// The skeleton of the reference surface. Where another thread extracts it just now, waits for
     /// that.
     pub fn skeleton(&self) -> Result<Arc<Skeleton>, SkeletonError> {
-        extracted(&self.skeleton, &self.surface)
+        extracted(&self.skeleton, &self.surface, &self.cancellation)
     }
 
     /// Extracts the skeleton when it is called, on whatever thread that is.
     pub fn in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
         let (skeleton, surface) = (Arc::clone(&self.skeleton), Arc::clone(&self.surface));
-        move || drop(extracted(&skeleton, &surface))
+        move || drop(extracted(&skeleton, &surface, &Cancellation::default()))
     }
 
     /// Takes this skeleton for that of the surface.
@@ -63,7 +79,7 @@ impl SkeletonEditor {
         if carried != vertices {
             return Err(SkinError::OtherSurface { vertices, carried, held: vertices });
         }
-        self.skeleton = Arc::new(OnceLock::from(Ok(skeleton)));
+        self.skeleton = Arc::new(Mutex::new(Some(Ok(skeleton))));
         self.near.clear();
         self.skins.clear();
         Ok(())
@@ -159,12 +175,21 @@ impl SkeletonEditor {
 }
 
 fn extracted(
-    skeleton: &OnceLock<Result<Arc<Skeleton>, SkeletonError>>,
+    skeleton: &Mutex<Extracted>,
     surface: &Surface,
+    cancellation: &Cancellation,
 ) -> Result<Arc<Skeleton>, SkeletonError> {
-    skeleton
-        .get_or_init(|| Skeleton::extract(surface, &SkeletonSettings::default()).map(Arc::new))
-        .clone()
+    // It is put there whole, or not at all.
+    let mut known = skeleton.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = &*known {
+        return known.clone();
+    }
+    let settings = SkeletonSettings::default();
+    let found = Skeleton::extract_unless(surface, &settings, cancellation).map(Arc::new);
+    if found != Err(SkeletonError::Cancelled) {
+        *known = Some(found.clone());
+    }
+    found
 }
 
 /// The field that holds the point of a drag.

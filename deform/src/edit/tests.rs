@@ -1,8 +1,11 @@
 //! The JSON of edits.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::*;
+use crate::cancellation::Cancellation;
 
 fn error(json: &str) -> String {
     serde_json::from_str::<Edit>(json).expect_err(json).to_string()
@@ -142,5 +145,24 @@ fn between(neutral: &Value, value: &Value, fraction: f64) -> Value {
             let [neutral, value] = [neutral, value].map(|number| number.as_f64().unwrap());
             json!(neutral + fraction * (value - neutral))
         }
+    }
+}
+
+#[test]
+fn edits_that_are_given_up_are_evaluated_when_they_are_wanted_again() {
+    let mesh = crate::shapes::box_of_tets([8, 2, 2], [0.0; 3], [4.0, 1.0, 1.0]);
+    let features = crate::features::FeatureSettings::default();
+    let surface = Arc::new(crate::surface::Surface::extract(&mesh, &features).unwrap());
+    let cancellation = Cancellation::default();
+    let mut editor = Editor::new(surface).unwrap().with_cancellation(cancellation.clone());
+    let edit = |edit: Value| [serde_json::from_value::<Edit>(edit).unwrap()];
+    for stack in [
+        edit(json!({"translate": {"features": ["x-max"], "fixed": ["x-min"], "by": [0, 0, 0.5]}})),
+        edit(json!({"skeleton": {"at": [2, 0.5, 0.5], "by": [0, 0, 0.1]}})),
+    ] {
+        cancellation.cancel();
+        assert_eq!(editor.displacement(&stack), Err(EditError::Cancelled));
+        cancellation.renew();
+        assert_ne!(editor.displacement(&stack), Err(EditError::Cancelled));
     }
 }

@@ -8,6 +8,7 @@ use super::{
     BlockPreconditioner, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
     Tolerance,
 };
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Halo};
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) preconditioned by a [`BlockPreconditioner`].
@@ -21,6 +22,7 @@ pub struct ConjugateGradients<const B: usize> {
     first: OnceLock<Prepared<B>>,
     fallback: OnceLock<Prepared<B>>,
     max_iterations: usize,
+    cancellation: Cancellation,
 }
 
 /// A preconditioner, on a rank that has rows; or why there is none on any.
@@ -46,7 +48,8 @@ impl<const B: usize> ConjugateGradients<B> {
     ) -> Result<Self, LinearError> {
         let matrix = matrix.into();
         let [first, fallback] = [const { OnceLock::new() }; 2];
-        let solver = Self { halo, matrix, first, fallback, max_iterations: 2000 };
+        let (max_iterations, cancellation) = (2000, Cancellation::default());
+        let solver = Self { halo, matrix, first, fallback, max_iterations, cancellation };
         solver.preconditioner(Factorization::IncompleteCholesky)?;
         Ok(solver)
     }
@@ -55,6 +58,11 @@ impl<const B: usize> ConjugateGradients<B> {
     #[must_use]
     pub fn with_max_iterations(self, max_iterations: usize) -> Self {
         Self { max_iterations, ..self }
+    }
+
+    /// The solver with what has a solve given up, which is looked at before each iteration.
+    pub(super) fn with_cancellation(self, cancellation: Cancellation) -> Self {
+        Self { cancellation, ..self }
     }
 
     /// The matrix of this rank.
@@ -137,8 +145,12 @@ impl<const B: usize> ConjugateGradients<B> {
         let mut iterate = |kind| {
             self.preconditioner(kind)?;
             let apply = |vector: &[Columns<B, 1>], result: &mut [Columns<B, 1>]| {
+                if self.cancellation.is_cancelled() {
+                    return Err(LinearError::Cancelled);
+                }
                 // That it can be made was seen above.
                 let _ = self.apply(kind, vector.as_flattened(), result.as_flattened_mut());
+                Ok(())
             };
             let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
             let [convergence] = conjugate_gradients(
@@ -184,7 +196,9 @@ impl<const B: usize> LinearSolver<B> for ConjugateGradients<B> {
         matrix: Arc<SparseMatrix<B>>,
     ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
         Ok(Box::new(
-            Self::distributed(self.halo.clone(), matrix)?.with_max_iterations(self.max_iterations),
+            Self::distributed(self.halo.clone(), matrix)?
+                .with_max_iterations(self.max_iterations)
+                .with_cancellation(self.cancellation.clone()),
         ))
     }
 }

@@ -125,7 +125,8 @@ impl<M: Matrix<B>, const B: usize> Sum<'_, M, B> {
 const CORRECTION: f64 = 10.0;
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) from what `solution` holds, for each column by
-/// itself. `precondition` sets its second argument to an approximate inverse times its first.
+/// itself. `precondition` sets its second argument to an approximate inverse times its first, or
+/// says why the iteration is to end.
 ///
 /// A column is done once its residual is small enough, and the preconditioner says the same of the
 /// error: it must not want to change any value by more than [`CORRECTION`] times the relative
@@ -137,7 +138,7 @@ const CORRECTION: f64 = 10.0;
 /// the error is [`LinearError::NotFinite`].
 pub(super) fn conjugate_gradients<M: Matrix<B>, const B: usize, const K: usize>(
     matrix: &Sum<'_, M, B>,
-    mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]),
+    mut precondition: impl FnMut(&[Columns<B, K>], &mut [Columns<B, K>]) -> Result<(), LinearError>,
     right_side: &[Columns<B, K>],
     solution: &mut [Columns<B, K>],
     tolerances: [Tolerance; K],
@@ -189,7 +190,7 @@ pub(super) fn conjugate_gradients<M: Matrix<B>, const B: usize, const K: usize>(
         return Ok(result);
     }
     let mut preconditioned = vec![[[0.0; B]; K]; residual.len()];
-    precondition(&residual, &mut preconditioned);
+    precondition(&residual, &mut preconditioned)?;
     let mut active = unfinished(matrix, tolerances, target, reached, solution, &preconditioned);
     if !active.contains(&true) {
         return Ok(result);
@@ -228,7 +229,7 @@ pub(super) fn conjugate_gradients<M: Matrix<B>, const B: usize, const K: usize>(
         }) {
             return Ok(result);
         }
-        precondition(&residual, &mut preconditioned);
+        precondition(&residual, &mut preconditioned)?;
         let still = unfinished(matrix, tolerances, target, reached, solution, &preconditioned);
         active = std::array::from_fn(|column| active[column] && still[column]);
         if !active.contains(&true) {

@@ -31,6 +31,7 @@ mod real;
 mod tests;
 mod transfer;
 
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Halo};
 use crate::vector::Vector;
 pub use cholesky::Cholesky;
@@ -68,8 +69,43 @@ pub fn solver<const B: usize>(
     {
         return Ok(Box::new(direct));
     }
-    let settings = MultigridSettings { by_half: true, ..MultigridSettings::default() };
-    Ok(Box::new(Multigrid::new(matrix, settings)?))
+    Ok(Box::new(Multigrid::new(matrix, of_one_process())?))
+}
+
+fn of_one_process() -> MultigridSettings {
+    MultigridSettings { by_half: true, ..MultigridSettings::default() }
+}
+
+/// The kernel's own solvers of one process, which are given up where that is asked for: it is
+/// looked at before each set-up and each iteration.
+#[derive(Debug, Clone, Default)]
+pub struct Cancellable(pub Cancellation);
+
+impl Cancellable {
+    fn solver<const B: usize>(&self, matrix: Arc<SparseMatrix<B>>, halo: &Halo) -> Solver<B> {
+        if halo.communicator().size() > 1 || B * matrix.rows() <= DIRECT {
+            return solver(matrix, halo);
+        }
+        if self.0.is_cancelled() {
+            return Err(LinearError::Cancelled);
+        }
+        let multigrid = Multigrid::new(matrix, of_one_process())?;
+        Ok(Box::new(multigrid.with_cancellation(self.0.clone())))
+    }
+}
+
+impl Solvers for Cancellable {
+    fn scalar(&self, matrix: Arc<SparseMatrix<1>>, halo: &Halo, _: &[Vector]) -> Solver<1> {
+        self.solver(matrix, halo)
+    }
+
+    fn vector(&self, matrix: Arc<SparseMatrix<3>>, halo: &Halo, _: &[Vector]) -> Solver<3> {
+        self.solver(matrix, halo)
+    }
+
+    fn are_wanted(&self) -> bool {
+        !self.0.is_cancelled()
+    }
 }
 
 /// The choice of solvers for the systems of a volume.
@@ -89,6 +125,13 @@ pub trait Solvers: std::fmt::Debug + Send + Sync {
     /// # Errors
     /// [`LinearError`], on all ranks.
     fn vector(&self, matrix: Arc<SparseMatrix<3>>, halo: &Halo, positions: &[Vector]) -> Solver<3>;
+
+    /// Whether anybody still waits for the systems to be set up. It is asked between the steps of
+    /// the set-up, which ends where it is not so with [`LinearError::Cancelled`]. Of several ranks
+    /// all have to say the same.
+    fn are_wanted(&self) -> bool {
+        true
+    }
 }
 
 /// A solver, or why there is none.
@@ -247,6 +290,9 @@ pub enum LinearError {
         /// Its error code.
         code: i32,
     },
+    /// It was given up: see [`Cancellable`].
+    #[error("the linear system was given up before it was solved")]
+    Cancelled,
     /// Another of the ranks that solve together could not go on.
     #[error("the linear system could not be set up on another rank")]
     OtherRank,

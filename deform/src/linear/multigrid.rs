@@ -14,6 +14,7 @@ use super::{
     ConjugateGradients, Convergence, Factorization, LinearError, LinearSolver, SparseMatrix,
     Tolerance,
 };
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Halo};
 use crate::vector::Vector;
 
@@ -88,6 +89,7 @@ pub struct Multigrid<const B: usize> {
     levels: Arc<Levels<B>>,
     constants: Option<Arc<Constants>>,
     fallback: OnceLock<Result<ConjugateGradients<B>, LinearError>>,
+    cancellation: Cancellation,
 }
 
 /// The matrix, as products need it.
@@ -271,7 +273,18 @@ impl<const B: usize> Multigrid<B> {
             levels: Arc::clone(&self.levels),
             constants: self.constants.clone(),
             fallback: OnceLock::new(),
+            cancellation: self.cancellation.clone(),
         }
+    }
+
+    /// The solver with what has a solve given up, which is looked at before each iteration.
+    pub(super) fn with_cancellation(self, cancellation: Cancellation) -> Self {
+        let of_own = |own: ConjugateGradients<B>| own.with_cancellation(cancellation.clone());
+        let fallback = self
+            .fallback
+            .into_inner()
+            .map_or_else(OnceLock::new, |made| OnceLock::from(made.map(of_own)));
+        Self { fallback, cancellation, ..self }
     }
 
     /// The matrix of this rank. Where it is kept by its half, which the levels need as well, it is
@@ -326,7 +339,8 @@ impl<const B: usize> Multigrid<B> {
             NullSpace::Constants => Some(Arc::new(Constants::new(&matrix, &halo))),
         };
         let matrix = if settings.by_half { Kept::new(matrix, &levels) } else { Kept::Rows(matrix) };
-        let solver = Self { halo, matrix, settings, levels, constants, fallback: OnceLock::new() };
+        let (fallback, cancellation) = (OnceLock::new(), Cancellation::default());
+        let solver = Self { halo, matrix, settings, levels, constants, fallback, cancellation };
         if matches!(*solver.levels, Levels::None) {
             solver.fallback()?;
         }
@@ -334,7 +348,10 @@ impl<const B: usize> Multigrid<B> {
     }
 
     fn fallback(&self) -> Result<&ConjugateGradients<B>, LinearError> {
-        let made = || ConjugateGradients::distributed(self.halo.clone(), self.matrix());
+        let made = || {
+            ConjugateGradients::distributed(self.halo.clone(), self.matrix())
+                .map(|own| own.with_cancellation(self.cancellation.clone()))
+        };
         self.fallback.get_or_init(made).as_ref().map_err(|error| *error)
     }
 
@@ -348,7 +365,11 @@ impl<const B: usize> Multigrid<B> {
         let mut workspace = hierarchy.workspace();
         let scale = self.sum().scale(right_side);
         let precondition = |vector: &[Columns<B, K>], result: &mut [Columns<B, K>]| {
+            if self.cancellation.is_cancelled() {
+                return Err(LinearError::Cancelled);
+            }
             hierarchy.apply(&mut workspace, scale, vector, result);
+            Ok(())
         };
         let limit = self.settings.max_iterations;
         conjugate_gradients(&self.sum(), precondition, right_side, solution, tolerances, limit)
@@ -459,6 +480,9 @@ impl<const B: usize> LinearSolver<B> for Multigrid<B> {
         &self,
         matrix: Arc<SparseMatrix<B>>,
     ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-        Ok(Box::new(self.of_like_matrix(matrix)?))
+        if self.cancellation.is_cancelled() {
+            return Err(LinearError::Cancelled);
+        }
+        Ok(Box::new(self.of_like_matrix(matrix)?.with_cancellation(self.cancellation.clone())))
     }
 }

@@ -283,3 +283,26 @@ fn the_same_bits_whatever_the_number_of_threads() {
     let one = run(1);
     assert!(one.1 > 3 && one == run(2) && one == run(3));
 }
+
+#[test]
+fn what_is_given_up_is_neither_set_up_nor_solved() {
+    let cancellation = Cancellation::default();
+    let solvers = Cancellable(cancellation.clone());
+    let matrix = Arc::new(laplace(12));
+    let made = || solvers.scalar(Arc::clone(&matrix), &Halo::none(), &[]);
+    let (solver, right_side) = (made().unwrap(), right_side::<1>(matrix.rows()));
+    let mut solution = vec![[0.0]; matrix.rows()];
+    cancellation.cancel();
+    assert!(!solvers.are_wanted());
+    assert_eq!(solver.solve(&right_side, &mut solution, TIGHT), Err(LinearError::Cancelled));
+    assert!(matches!(solver.renewed(Arc::clone(&matrix)), Err(LinearError::Cancelled)));
+    assert!(matches!(made(), Err(LinearError::Cancelled)));
+    cancellation.renew();
+    let mut expected = solution.clone();
+    solver.solve(&right_side, &mut solution, TIGHT).unwrap();
+    BuiltIn
+        .scalar(Arc::clone(&matrix), &Halo::none(), &[])
+        .and_then(|own| own.solve(&right_side, &mut expected, TIGHT))
+        .unwrap();
+    assert_eq!(solution, expected);
+}

@@ -21,9 +21,9 @@ use serde::{Deserialize, Serialize};
 use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, agree};
 use crate::distributed::{DistributedError, PartBoundary};
-use crate::edit::{Edit, Editor};
+use crate::edit::{Edit, EditError, Editor};
 use crate::limits::{EDITS, Exceeded, LISTED};
-use crate::linear::{BuiltIn, Solvers};
+use crate::linear::{BuiltIn, Cancellable, Solvers};
 use crate::mesh::{Domain, Mesh, Vector};
 use crate::quality::{Guard, SurfaceRule};
 use crate::surface::{Surface, require_sound};
@@ -205,13 +205,16 @@ impl Shaper {
         let ranks = domain.communicator();
         let editor = if ranks.size() == 1 { editor? } else { agree(&**ranks, editor)? };
         let reference = Arc::clone(domain.mesh().shared_points());
+        let cancellation = Cancellation::default();
+        let is_alone = ranks.size() == 1;
+        let (editor, solvers): (_, Arc<dyn Solvers>) = if is_alone {
+            let editor = editor.map(|editor| editor.with_cancellation(cancellation.clone()));
+            (editor, Arc::new(Cancellable(cancellation.clone())))
+        } else {
+            (editor, Arc::new(BuiltIn))
+        };
         Ok(Self {
-            body: Arc::new(Body {
-                domain,
-                boundary,
-                solvers: Arc::new(BuiltIn),
-                cancellation: Cancellation::default(),
-            }),
+            body: Arc::new(Body { domain, boundary, solvers, cancellation }),
             editor,
             operators: Vec::new(),
             reference,
@@ -252,8 +255,9 @@ impl Shaper {
     }
 
     /// By which another thread has a plan under way given up: it is refused with
-    /// [`Refused::Cancelled`] at the next sub-step, solve or check, and so are those that follow
-    /// until [`Cancellation::renew`]. Of one process alone: of several ranks each would have to be
+    /// [`Refused::Cancelled`] at the next look, in the set-up, the iterations of a solve and the
+    /// checks, and so are those that follow until [`Cancellation::renew`]; with
+    /// [other solvers](Self::with_solvers) their set-up and solves are finished first. Of one process alone: of several ranks each would have to be
     /// told in the same moment.
     #[must_use]
     pub fn cancellation(&self) -> &Cancellation {
@@ -445,7 +449,15 @@ impl Shaper {
 
 /// The displacement of the surface that a stack makes, where the surface is.
 fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>, Refused> {
-    editor.map_or_else(|| Ok(Vec::new()), |editor| Ok(editor.displacement(stack)?))
+    editor.map_or_else(
+        || Ok(Vec::new()),
+        |editor| {
+            editor.displacement(stack).map_err(|error| match error {
+                EditError::Cancelled => Refused::Cancelled,
+                error => error.into(),
+            })
+        },
+    )
 }
 
 /// What is out of the plane by less than this part of the largest displacement is rounding.

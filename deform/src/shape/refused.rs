@@ -7,6 +7,7 @@ use crate::{
     edit::EditError,
     features::UnknownFeature,
     limits::Exceeded,
+    linear::LinearError,
     mesh::Vector,
     quality::Refusal,
     surface::BrokenSurface,
@@ -121,7 +122,13 @@ impl Refused {
     /// Whether it was given up, of which nothing follows for the next such request.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
-        matches!(self, Refused::Cancelled | Refused::Guard(Refusal::Cancelled))
+        matches!(
+            self,
+            Refused::Cancelled
+                | Refused::Guard(Refusal::Cancelled)
+                | Refused::Edit(EditError::Cancelled)
+                | Refused::Volume(VolumeError::Linear(LinearError::Cancelled))
+        )
     }
 
     /// Whether it is the surface that is broken.
@@ -140,11 +147,12 @@ impl Refused {
 
     /// Whether a linear system could not be solved: the same on all ranks.
     pub(super) fn breaks_down(&self) -> bool {
-        matches!(
-            self,
-            Refused::Volume(VolumeError::Linear(_))
-                | Refused::Elsewhere(Elsewhere { breaks_down: true, .. })
-        )
+        !self.is_cancelled()
+            && matches!(
+                self,
+                Refused::Volume(VolumeError::Linear(_))
+                    | Refused::Elsewhere(Elsewhere { breaks_down: true, .. })
+            )
     }
 
     /// The least scaled Jacobian on the way, where that is what was wrong.

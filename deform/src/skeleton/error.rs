@@ -49,6 +49,9 @@ pub enum SkeletonError {
         /// The value given.
         value: f64,
     },
+    /// It was given up: see [`Skeleton::extract_unless`](super::Skeleton::extract_unless).
+    #[error("the skeleton was given up before it was known")]
+    Cancelled,
     /// The result is no skeleton: a defect of this library.
     #[error("the extraction ended in what is no skeleton: {0}")]
     Invalid(#[from] InvalidSkeleton),

@@ -4,6 +4,7 @@ use super::closing::closed_pieces;
 use super::medial::NearestPoints;
 use super::pruning::Curves;
 use super::{Skeleton, SkeletonError, SkeletonSettings, flow, resolution, thinning};
+use crate::cancellation::Cancellation;
 use crate::surface::Surface;
 
 impl Skeleton {
@@ -29,17 +30,34 @@ impl Skeleton {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn extract(surface: &Surface, settings: &SkeletonSettings) -> Result<Self, SkeletonError> {
+        Self::extract_unless(surface, settings, &Cancellation::default())
+    }
+
+    /// The curve skeleton of a surface, unless it is given up meanwhile: that is looked at before
+    /// each step of the flow.
+    ///
+    /// # Errors
+    /// As [`Skeleton::extract`], and [`SkeletonError::Cancelled`].
+    pub fn extract_unless(
+        surface: &Surface,
+        settings: &SkeletonSettings,
+        cancellation: &Cancellation,
+    ) -> Result<Self, SkeletonError> {
         settings.validate()?;
+        let go_on = || {
+            if cancellation.is_cancelled() { Err(SkeletonError::Cancelled) } else { Ok(()) }
+        };
         let mut nodes = Vec::new();
         let mut curves = Vec::new();
         let mut node_of_vertex = vec![0u32; surface.points().len()];
         for mut piece in closed_pieces(surface)? {
+            go_on()?;
             resolution::resample(&mut piece.mesh, settings.least_vertices, settings.most_vertices);
             let (mut mesh, into) = piece.mesh.scattered();
             piece.vertices.iter_mut().for_each(|(_, vertex)| *vertex = into[*vertex as usize]);
             let centroid = mesh.centroid();
             let tree = NearestPoints::of(&mesh);
-            flow::contract(&mut mesh, &tree, settings);
+            flow::contract(&mut mesh, &tree, settings, go_on)?;
             let mut found = Curves::new(thinning::thin(&mesh), &piece.vertices, &tree, settings);
             // A piece without a middle line is drawn together to a point that hangs on the last
             // bit.

@@ -2,10 +2,10 @@
 
 use faer::Mat;
 
-use super::SkeletonSettings;
 use super::medial::{self, NearestPoints};
 use super::system::{Row, least_squares};
 use super::triangulation::Triangulation;
+use super::{SkeletonError, SkeletonSettings};
 use crate::mesh::Vector;
 use crate::vector::{add, distance, dot, length, scale, subtract};
 
@@ -25,12 +25,14 @@ const DEPTH: f64 = 0.5;
 const REACH: f64 = 2.0;
 
 /// Contracts a surface of diagonal 1 until it hardly has an area (Tagliasacchi, Alhashim, Olson and
-/// Zhang 2012).
+/// Zhang 2012). `go_on` is asked before each step; its error ends the flow.
 pub(super) fn contract(
     mesh: &mut Triangulation,
     tree: &NearestPoints,
     settings: &SkeletonSettings,
-) {
+    go_on: impl Fn() -> Result<(), SkeletonError>,
+) -> Result<(), SkeletonError> {
+    go_on()?;
     let first_area = mesh.area();
     let mut flow = Flow {
         shortest: settings.shortest_edge,
@@ -42,6 +44,7 @@ pub(super) fn contract(
     let largest = 2 * flow.mesh.points.len() + 1000;
     let mut area = 0.0;
     for _ in 0..settings.iterations {
+        go_on()?;
         flow.step(settings);
         flow.collapse_short_edges();
         if flow.mesh.vertex_count() < largest {
@@ -55,6 +58,7 @@ pub(super) fn contract(
         }
         area = reached;
     }
+    Ok(())
 }
 
 struct Flow<'a> {

@@ -124,16 +124,22 @@ impl VolumeOperator {
         let domain = domain.into();
         let mesh = domain.mesh();
         let cells = mesh.cells().len();
+        let go_on = || {
+            if solvers.are_wanted() { Ok(()) } else { Err(LinearError::Cancelled) }
+        };
         let countable = if u32::try_from(cells).is_ok() {
             Ok(())
         } else {
             Err(VolumeError::TooLarge { cells })
         };
         agreed(domain.communicator(), countable)?;
+        go_on()?;
         let ordered = Arc::new(Ordered::new(mesh));
         let elements = Elements::new(ordered.mesh());
+        go_on()?;
         let stiffness =
             stiffness(&ordered, ordered.mesh(), &elements, settings.stiffening, &domain)?;
+        go_on()?;
         let (graph, pattern) = Graph::new(Arc::clone(&ordered), boundary, &domain)?;
         let graph = Arc::new(graph);
         let constraints =
@@ -143,6 +149,7 @@ impl VolumeOperator {
             vertices.iter().map(|&vertex| mesh.points()[vertex as usize]).collect()
         };
         let unknown_points = positions(&graph.vertices);
+        go_on()?;
         let start = Start::Fresh(solvers, &halo, &unknown_points);
         let stiffened = Stiffened { mesh: ordered.mesh(), elements, stiffness };
         let pattern = Arc::new(pattern);

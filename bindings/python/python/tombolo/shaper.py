@@ -121,7 +121,8 @@ class Shaper:
     """Gives a mesh other shapes: what `tombolo edit` does, to the bit.
 
     The operators are set up once, by the first shape, and serve all that follow. Every shape is measured from the mesh
-    as it was given. Work ends with Ctrl-C, and with `cancel` from another thread.
+    as it was given. Work ends with Ctrl-C, and with `cancel` from another thread, once the step of a set-up or of a
+    factor that was begun is finished.
 
     Parameters
     ----------

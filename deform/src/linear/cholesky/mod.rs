@@ -62,7 +62,8 @@ impl<const B: usize> LinearSolver<B> for Cholesky<B> {
         tolerance: Tolerance,
     ) -> Result<Convergence, LinearError> {
         let apply = |vector: &[[[f64; B]; 1]], result: &mut [[[f64; B]; 1]]| {
-            self.factor.solve(vector, result)
+            self.factor.solve(vector, result);
+            Ok(())
         };
         let (right_side, solution) = (single_column(right_side), single_column_mut(solution));
         let sum = Sum { matrix: &*self.matrix, halo: &Halo::none() };
