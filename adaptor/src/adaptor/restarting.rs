@@ -195,14 +195,21 @@ impl Again {
         });
         let of_checkpoint = orders.chain(run.waiting.iter().cloned()).map(|saved| {
             let SavedCommand { id, by, command } = saved;
-            let taken = Taken { id, by, command, outcome: Outcome::Open {}, is_before: true };
-            outcomes.remove(&taken.id).unwrap_or((usize::MAX, taken))
+            let outcome = Outcome::Open {};
+            let new = Taken { id, by: by.clone(), command: None, outcome, is_before: true };
+            let (at, mut taken) = outcomes.remove(&new.id).unwrap_or((usize::MAX, new));
+            if taken.command.is_none() {
+                (taken.by, taken.command) = (by, Some(command));
+            }
+            (at, taken)
         });
         let of_checkpoint: Vec<_> = of_checkpoint.collect();
         let mut rest: Vec<_> = outcomes.into_values().collect();
         rest.sort_by_key(|(at, _)| *at);
         for (at, taken) in of_checkpoint.into_iter().chain(rest) {
             let Taken { id, by, command, outcome, is_before } = taken;
+            // One that neither the journal nor the checkpoint has was settled before that.
+            let Some(command) = command else { continue };
             let is_lasting = matches!(
                 command,
                 Command::Order(_) | Command::Parameter(_) | Command::Pipelines(_)

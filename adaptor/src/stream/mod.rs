@@ -422,3 +422,18 @@ async fn serve(
         () = ended => {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_of_the_stream_that_panics_is_begun_again() {
+        let mut begun = 0;
+        while went_wrong("test", || {
+            begun += 1;
+            assert!(begun > 2, "a fault");
+        }) {}
+        assert_eq!(begun, 3);
+    }
+}

@@ -35,8 +35,8 @@ pub struct Taken {
     pub id: String,
     /// Who gave it.
     pub by: CommandAuthor,
-    /// The command.
-    pub command: Command,
+    /// The command; `None` where the lines that were read do not have it, which the checkpoint has.
+    pub command: Option<Command>,
     /// What became of it.
     pub outcome: Outcome,
     /// Whether it was accepted before the checkpoint.
@@ -197,6 +197,7 @@ impl Reader {
         }
         self.runs.insert(header.id);
         self.is_among_them = true;
+        self.given_again.clear();
         self.last_given_again = None;
         self.join();
         if let Some(restart) = goes_on {
@@ -216,6 +217,8 @@ impl Reader {
     /// Lets go of what the checkpoint knows.
     fn come_to_checkpoint(&mut self) {
         if !std::mem::replace(&mut self.has_checkpoint, true) {
+            // What still waits is in the checkpoint, whoever gave it.
+            self.given_again.clear();
             self.taken.retain(|_, taken| taken.outcome == Outcome::Open {});
             self.history = History::default();
             self.last_given_again = None;
@@ -254,13 +257,13 @@ impl Reader {
         if let Some(command) = command.filter(|_| status == OrderStatus::Accepted) {
             if is_given_again {
                 self.given_again.insert(id);
-            } else if !self.taken.contains_key(&id) {
-                let by = by.unwrap_or(CommandAuthor::Program);
-                let (outcome, is_before) = (Outcome::Open {}, !self.has_checkpoint);
-                let taken = Taken { id: id.clone(), by, command, outcome, is_before };
-                self.accepted.push(id.clone());
-                self.taken.insert(id, taken);
-                WAITING.check(self.taken.len())?;
+                return Ok(());
+            }
+            let is_before = !self.has_checkpoint;
+            let taken = self.taken(id, is_before)?;
+            if taken.command.is_none() {
+                taken.by = by.unwrap_or(CommandAuthor::Program);
+                taken.command = Some(command);
             }
             return Ok(());
         }
@@ -268,24 +271,33 @@ impl Reader {
             return Ok(());
         }
         self.history.until = self.history.until.max(Some(cycle));
-        let comes_late = self.last_given_again == Some(cycle);
-        if let Some(taken) = self.taken.get_mut(&id) {
-            taken.outcome = match status {
+        if self.given_again.remove(&id) {
+            self.last_given_again = Some(cycle);
+        } else if self.has_checkpoint {
+            let comes_late = self.last_given_again == Some(cycle);
+            // One that is new here was accepted before, and is in the checkpoint.
+            self.taken(id.clone(), true)?.outcome = match status {
                 OrderStatus::Applied => Outcome::Applied { cycle, comes_late },
                 _ => Outcome::Rejected { cycle, reason: reason.unwrap_or_default() },
             };
-            if self.has_checkpoint {
-                self.history.settled.retain(|(known, _)| *known != id);
-                self.history.settled.push((id, cycle));
-            } else {
-                // Before the checkpoint what is settled is known to it.
-                self.taken.remove(&id);
-                self.accepted.retain(|known| *known != id);
-            }
-        } else if self.given_again.remove(&id) {
-            self.last_given_again = Some(cycle);
+            self.history.settled.retain(|(known, _)| *known != id);
+            self.history.settled.push((id, cycle));
+        } else if self.taken.remove(&id).is_some() {
+            // Before the checkpoint what is settled is known to it.
+            self.accepted.retain(|known| *known != id);
         }
         Ok(())
+    }
+
+    /// The command of this name.
+    fn taken(&mut self, id: String, is_before: bool) -> Result<&mut Taken, Exceeded> {
+        if !self.taken.contains_key(&id) {
+            WAITING.check(self.taken.len() + 1)?;
+            self.accepted.push(id.clone());
+        }
+        let (by, command, outcome) = (CommandAuthor::Program, None, Outcome::Open {});
+        let new = Taken { id: id.clone(), by, command, outcome, is_before };
+        Ok(self.taken.entry(id).or_insert(new))
     }
 
     fn finish(mut self) -> Since {
@@ -359,6 +371,22 @@ mod tests {
         let error = read(&broken, "r1").unwrap_err();
         assert!(error.to_string().starts_with("line 9: "), "{error}");
     }
+    #[test]
+    fn what_became_of_a_command_is_known_where_the_checkpoint_alone_has_it() {
+        let lines = goes_on(
+            "r2",
+            ("r1", "k", 2),
+            r#"{"checkpoint":{"id":"k2","cycle":2,"time":0}}
+{"id":"open","status":"applied","cycle":4,"time":0}
+{"shape":{"order":"open","shape":1,"cycle":4}}
+"#,
+        );
+        let from = RestartedFrom { run: "r2".into(), checkpoint: "k2".into(), cycle: 2 };
+        let since = Since::read(format!("{JOURNAL}\n{lines}").as_bytes(), &from).unwrap();
+        assert_eq!(settled(&since), [("open", 4)]);
+        assert_eq!(since.commands[0].command, None);
+    }
+
     /// The lines of a run that goes on from the checkpoint, or from one of a run that did.
     fn goes_on(id: &str, from: (&str, &str, u64), lines: &str) -> String {
         let (run, checkpoint, cycle) = from;
