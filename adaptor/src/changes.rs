@@ -202,13 +202,13 @@ mod tests {
 
     use super::*;
     use crate::journal::Journal;
-    use crate::steering::Told;
+    use crate::steering::Events;
 
     fn changes() -> Changes {
         let text = r#"{"version": 1, "pipelines": [{"name": "a", "stages": [{"quality": {}}]}]}"#;
         let config = Arc::new(parse(text, "test.json").unwrap());
         let (queue, log) =
-            (Arc::default(), Arc::new(Log::new(Journal::none(), None, Told::default())));
+            (Arc::default(), Arc::new(Log::new(Journal::none(), None, Events::default())));
         Changes::new(config, Vec::new(), queue, log, Arc::default())
     }
 

@@ -14,10 +14,12 @@
 //! | `command`, `id` | the kind of a command that is no order, such as `pause`, and its id |
 //! | `pipeline`, `viewer` | their names |
 //! | `address`, `path` | an address, a file |
+//! | `rank`, `shape`, `checkpoint`, `name` | a rank, a shape of an order, a checkpoint, a run at a relay |
 //! | `reason` | why something was not done |
 //!
 //! A mistake is a warning or an error; the life of orders, what was commanded, who watches and what
-//! was written are told at `INFO` and `DEBUG`. On several ranks rank 0 speaks for all.
+//! was written are told at `INFO` and `DEBUG`. On several ranks rank 0 speaks for all, but for one
+//! that ends the job.
 //!
 //! A host that has set a subscriber of `tracing` has all events there. One that has set a logger of
 //! the crate `log`, and no subscriber, has them there as records, with the fields behind the

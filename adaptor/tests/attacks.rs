@@ -416,20 +416,16 @@ fn one_who_watches_sends_no_long_messages() {
 fn a_new_connection_is_no_way_around_the_limit_of_messages() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
     let url = watching_url(&solver.adaptor);
-    let (begun, mut held_back) = (Instant::now(), false);
-    let mut said = 0_u32;
-    while !held_back && said < 400 {
+    let begun = Instant::now();
+    for _ in 0..5 {
         let mut viewer = Viewer::try_connect(&url).expect("let in");
-        for _ in 0..20 {
-            viewer.send_unwelcome(Message::text("{}"));
-            said += 1;
-        }
-        held_back = (0..20).any(|_| {
-            let told = viewer.look_for("error", Duration::from_millis(500), |_| true);
-            told.is_some_and(|told| told["message"].as_str().unwrap().contains("a second"))
-        });
+        (0..20).for_each(|_| viewer.send_unwelcome(Message::text("{}")));
+        // Each is answered, late as it may be.
+        (0..20).for_each(|_| drop(viewer.wait_for("error", |_| true)));
     }
-    assert!(held_back, "{said} messages in {:?}", begun.elapsed());
+    // 40 at once, and 20 a second.
+    let taken = begun.elapsed();
+    assert!(taken > Duration::from_millis(2900), "100 messages in {taken:?}");
     // Who drives has an allowance of its own.
     let mut driver = Viewer::connect(&solver.adaptor);
     driver.hello();

@@ -49,7 +49,7 @@ fn stages_of_one_pipeline_keep_their_own_files() {
     assert_eq!(there(folder.path(), ""), ["newest-a.vtp", "newest-b.vtp"]);
 
     let folder = tempfile::tempdir().unwrap();
-    let alerts = r#"[{"name": "mix", "stages": [{"statistics": {"field": "speed"}}, {"surface": {}},
+    let alerts = r#"[{"name": "mix", "stages": [{"surface": {}}, {"statistics": {"field": "speed"}},
         {"write": {"file": "mix-{cycle}.vtp", "keep": 2}}], "when": "speed.max > 1",
         "again_after": {"steps": 2}, "then": [{"write": {"file": "alert-{cycle}.vtp"}}]}]"#;
     run(alerts, 8, folder.path());

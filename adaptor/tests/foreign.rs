@@ -59,7 +59,9 @@ fn run_through(
 ) -> Vec<Outcome> {
     threads::run(count, |ranks| {
         let rank = ranks.rank();
-        let config = r#"{"version": 1, "steering": {"poll_steps": 3}}"#;
+        // The pipeline has the mesh looked at in each step.
+        let config = r#"{"version": 1, "steering": {"poll_steps": 3},
+                         "pipelines": [{"name": "health", "stages": [{"quality": {}}]}]}"#;
         let mut run = Run::new(Settings {
             config: language::check(config, "configuration").expect("a configuration"),
             orders: language::check_orders(ORDERS, "orders").expect("orders"),

@@ -187,7 +187,7 @@ fn runs_and_views_are_exported_to_files_of_their_own() {
         {"name": "wall_two", "stages": [{"surface": {}}, {"select": {"fields": []}}, {"stream": {}}]},
         {"name": "health", "stages": [{"quality": {}}]}]}"#;
     let mut cycles = Vec::new();
-    for steps in [6, 3] {
+    for steps in [20, 12] {
         let settings =
             Settings { config: config(text), output: output.path().into(), ..Settings::default() };
         let mut solver = Solver::new(settings);

@@ -217,6 +217,19 @@ impl Killed {
         last_cycle(after)
     }
 
+    /// The line about the checkpoint that was made just now; a slow disk may be late with it.
+    fn next_checkpoint(&self) -> String {
+        loop {
+            let journal = self.journal();
+            let begun = journal.rfind("{\"run\":").unwrap_or(0);
+            let whole = journal[begun..].rsplit_once('\n').map_or("", |(whole, _)| whole);
+            if let Some(line) = whole.lines().find(|line| line.starts_with("{\"checkpoint\":")) {
+                return line.to_owned();
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
     /// Runs with a viewer that asks for this and that, and is killed; says how many cycles it has
     /// done again. It saves its state at this cycle, if at any.
     fn run(&mut self, cycles: u64, saved: Option<u64>) -> usize {
@@ -237,9 +250,7 @@ impl Killed {
             if Some(cycle) == saved {
                 let bytes = solver.adaptor.checkpoint().to_bytes();
                 state = Some((bytes, solver.mesh.clone(), solver.cycle));
-                let journal = self.journal();
-                let checkpoints = journal.lines().filter(|it| it.starts_with("{\"checkpoint\":"));
-                self.line = checkpoints.last().unwrap().to_owned();
+                self.line = self.next_checkpoint();
             }
             step(&mut solver, &mut done);
             std::thread::sleep(Duration::from_micros(self.random.u64(..3000)));

@@ -39,7 +39,9 @@ pub use seeds::Seeds;
 pub use target::Target;
 
 /// The longest that a reader may take for an input.
-pub const LONGEST: Duration = Duration::from_secs(10);
+pub const LONGEST: Duration = Duration::from_secs(30);
+/// Inputs that are read however long they take.
+const LEAST: u64 = 16;
 /// Bytes that an input may grow to.
 const MOST_BYTES: usize = 1 << 20;
 /// Inputs with an outcome of their own that are damaged further.
@@ -119,7 +121,7 @@ pub fn fuzz(target: Target, seed: u64, time: Duration, folder: &Path) -> Result<
         inputs += 1;
     }
     let until = Instant::now() + time;
-    while Instant::now() < until {
+    while inputs < LEAST || Instant::now() < until {
         let mut input = random.choose(&kept).cloned().unwrap_or_default();
         let other = random.choose(&kept).cloned().unwrap_or_default();
         for _ in 0..=random.below(4) {

@@ -14,7 +14,7 @@ use std::{
 use tokio_tungstenite::tungstenite::{WebSocket, accept};
 
 /// How long the other side may take for anything.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 /// Bytes of the head of a request.
 const HEAD: usize = 1 << 14;
 

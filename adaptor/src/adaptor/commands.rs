@@ -145,15 +145,25 @@ impl Adaptor {
     fn take_received(&mut self, moment: Moment) -> VecDeque<Received> {
         let Some(until) = self.resumed.repeats_until(moment.cycle) else {
             self.resumed.puts_off = false;
-            return self.queue.take();
+            let mut received = self.queue.take();
+            if std::mem::take(&mut self.resumed.told) > 0 {
+                received
+                    .iter_mut()
+                    .filter_map(|it| it.reservation.as_mut())
+                    .for_each(Reservation::renew);
+            }
+            return received;
         };
         let pauses = self.queue.take_pauses();
         let mut put_off = Vec::new();
         self.queue.look(|received| put_off.push(received.id.clone()));
         self.resumed.puts_off = !put_off.is_empty();
-        let reason = format!("cycle {until}, up to which the run repeats what it has done before");
-        for id in put_off {
-            self.log.update(&id, |order| order.waits_for = Some(reason.clone()));
+        for id in put_off.split_off(self.resumed.told.min(put_off.len())) {
+            self.log.update(&id, |order| {
+                let what = "up to which the run repeats what it has done before";
+                order.waits_for = Some(format!("cycle {until}, {what}"));
+            });
+            self.resumed.told += 1;
         }
         pauses
     }

@@ -37,6 +37,8 @@ pub(super) struct Resumed {
     again: Again,
     /// Whether new commands wait until nothing is repeated any more.
     pub(super) puts_off: bool,
+    /// How many of them know why.
+    pub(super) told: usize,
 }
 
 /// The commands carried out again after a checkpoint, equal on all ranks.
@@ -119,7 +121,7 @@ impl Continued {
     /// What is left once a run has been set up.
     pub(super) fn into_resumed(self) -> Resumed {
         let Checkpoint { run, points, .. } = self.checkpoint;
-        Resumed { mesh: run.mesh.zip(points), again: self.again, puts_off: false }
+        Resumed { mesh: run.mesh.zip(points), again: self.again, puts_off: false, told: 0 }
     }
 }
 

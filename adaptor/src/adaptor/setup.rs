@@ -27,7 +27,7 @@ use crate::{
     recorder::Recorder,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, EditStack, Log, Parameters, Queue, Timed, Told},
+    steering::{Defaults, EditStack, Events, Log, Parameters, Queue, Timed},
     step::Moment,
     stream::{Clock, Hub, Server},
     watch::Watch,
@@ -78,7 +78,9 @@ impl Adaptor {
             }
             notes = continued.iter().flat_map(Continued::notes).cloned().collect();
             for (name, value) in &saved.parameters {
-                if let Err(reason) = parameters.resume(name, *value) {
+                if let Err(reason) = parameters.resume(name, *value)
+                    && first
+                {
                     tracing::warn!(run = &*run, "of the checkpoint: {reason}");
                 }
             }
@@ -98,7 +100,7 @@ impl Adaptor {
         };
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
         clock.set(moment);
-        let told = Told::new(first.then(|| Arc::clone(&run)), Arc::clone(&clock));
+        let events = Events::new(first.then(|| Arc::clone(&run)), Arc::clone(&clock));
         let log = Arc::new(Log::new(journal, hub.clone(), told));
         log.resume_notes(notes);
         let config = Arc::new(config);

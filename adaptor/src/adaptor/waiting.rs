@@ -8,8 +8,8 @@ use tombolo_pipelines::extract::Channel;
 use super::Adaptor;
 use crate::step::Moment;
 
-/// How long a paused run waits at once.
-const AT_ONCE: Duration = Duration::from_millis(100);
+/// How long a paused run waits between two calls of `look`.
+const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// What is called while the solver waits.
 pub(super) type Look = Box<dyn FnMut() + Send>;
@@ -59,7 +59,7 @@ impl Adaptor {
         let begun = Instant::now();
         while self.paused && !self.stopped {
             if self.communicator.rank() == 0 {
-                while !self.queue.wait(AT_ONCE) {
+                while !self.queue.wait(LOOK_PERIOD) {
                     self.look.iter_mut().for_each(|look| look());
                 }
             }

@@ -34,7 +34,7 @@ const TEXT: usize = 2 * DOCUMENT.most;
 const WRITE: Duration = Duration::from_secs(10);
 /// How long the last words to a server may take.
 const CLOSE: Duration = Duration::from_millis(500);
-/// How often the wheel is asked for again, and it is looked whether the server is silent.
+/// How often the wheel is asked for again, and how often the server's silence is looked for.
 const REGAIN: Duration = Duration::from_millis(200);
 /// The version of the protocol.
 const PROTOCOL: u32 = 2;

@@ -7,6 +7,8 @@ use std::{
     str::FromStr,
 };
 
+use tombolo_pipelines::language::is_fingerprint;
+
 use super::ClientError;
 
 /// Bytes that a link may have.
@@ -165,12 +167,9 @@ impl FromStr for Link {
         let (way, usual, rest) = match place.split_once("://") {
             Some(("http", rest)) => (Way::Plain, 80, rest),
             Some(("https", rest)) => {
-                let digits =
-                    |text: &&str| text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit());
-                let pinned = match fragment.strip_prefix("sha256=") {
-                    None => None,
-                    Some(text) => Some(text).filter(digits).map(str::to_ascii_lowercase),
-                };
+                let digits = fragment.strip_prefix("sha256=");
+                let pinned =
+                    digits.filter(|text| is_fingerprint(text)).map(str::to_ascii_lowercase);
                 if fragment.starts_with("sha256=") && pinned.is_none() {
                     return Err(wrong("its fingerprint has not 64 hexadecimal digits"));
                 }

@@ -143,7 +143,7 @@ impl Journal {
         let Some(shared) = &self.shared else { return };
         let text = line(&JournalNote::Checkpoint(note));
         let mut state = lock(&shared.state);
-        if state.kept + text.len() > 2 * KEPT {
+        if (state.trouble.is_some() || state.is_slow()) && state.kept + text.len() > 2 * KEPT {
             state.lost += 1;
         } else {
             state.push(Line { text, asked: None, is_withdrawn: false });

@@ -121,7 +121,7 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
                     view.take(frame, options, vtk)?;
                 }
             }
-            RecordedMessage::Text(text) if text.starts_with("{\"hello\"") => greetings += 1,
+            RecordedMessage::Text(text) if begins_run(&text) => greetings += 1,
             RecordedMessage::Text(text) if csv && text.starts_with("{\"monitor\"") => {
                 add(&mut tables, &text);
             }
@@ -161,6 +161,13 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Whether a message is the first of a run: later greetings of it have no orders.
+fn begins_run(text: &str) -> bool {
+    text.starts_with("{\"hello\"")
+        && serde_json::from_str::<serde_json::Value>(text)
+            .is_ok_and(|told| told["hello"]["orders"].is_array())
 }
 
 impl View {

@@ -65,17 +65,16 @@ pub(crate) enum Named {
 }
 
 impl KnownCommands {
-    /// Gives a command a name: the one that is wanted, or a new one. `command` is that of a viewer,
-    /// who may send it again.
+    /// Gives a command a name: the one that is wanted, or a new one. `digest` is the [hash](hash_of) of
+    /// a viewer's, who may send it again.
     ///
     /// # Errors
     /// Where another command has that name already.
     pub(super) fn name(
         &mut self,
         wanted: Option<String>,
-        command: Option<&Command>,
+        digest: Option<u64>,
     ) -> Result<Named, String> {
-        let digest = command.map(hash_of);
         let id = match wanted {
             Some(id) => match self.names.get(&id) {
                 Some(known) if known.is_some() && *known == digest => return Ok(Named::Again(id)),
@@ -96,9 +95,9 @@ impl KnownCommands {
 
     /// Keeps the name of a command of an earlier run from others, but for the viewer that sends it
     /// again; whether it is an order that is known.
-    pub(super) fn reserve(&mut self, id: &str, command: &Command) -> bool {
+    pub(super) fn reserve(&mut self, id: &str, digest: u64) -> bool {
         if !self.names.contains_key(id) {
-            self.names.insert(id.to_owned(), Some(hash_of(command)));
+            self.names.insert(id.to_owned(), Some(digest));
             self.named.push_back(id.to_owned());
         }
         self.order(id).is_some()
@@ -207,7 +206,7 @@ impl KnownCommands {
 }
 
 /// A hash by which commands of one name are told apart.
-fn hash_of(command: &Command) -> u64 {
+pub(super) fn hash_of(command: &Command) -> u64 {
     hash(serde_json::to_vec(command).unwrap_or_default())
 }
 
@@ -228,19 +227,19 @@ mod tests {
     #[test]
     fn the_same_command_again_is_known_and_another_of_its_name_is_refused() {
         let mut known = KnownCommands::default();
-        let named = |known: &mut KnownCommands, command| known.name(Some("a".into()), command);
-        let (pause, stop) = (Command::Pause {}, Command::Stop {});
-        assert_eq!(named(&mut known, Some(&pause)), Ok(Named::New("a".into())));
-        assert_eq!(named(&mut known, Some(&pause)), Ok(Named::Again("a".into())));
-        assert!(named(&mut known, Some(&stop)).is_err() && named(&mut known, None).is_err());
+        let named = |known: &mut KnownCommands, digest| known.name(Some("a".into()), digest);
+        let (pause, stop) = (hash_of(&Command::Pause {}), hash_of(&Command::Stop {}));
+        assert_eq!(named(&mut known, Some(pause)), Ok(Named::New("a".into())));
+        assert_eq!(named(&mut known, Some(pause)), Ok(Named::Again("a".into())));
+        assert!(named(&mut known, Some(stop)).is_err() && named(&mut known, None).is_err());
         known.forget("a");
-        assert_eq!(named(&mut known, Some(&stop)), Ok(Named::New("a".into())));
+        assert_eq!(named(&mut known, Some(stop)), Ok(Named::New("a".into())));
         assert_eq!(known.name(None, None), Ok(Named::New("o1".into())));
         assert!(known.name(Some("o1".into()), None).is_err());
         // One of an earlier run may be sent again too.
-        known.reserve("b", &pause);
-        assert_eq!(known.name(Some("b".into()), Some(&pause)), Ok(Named::Again("b".into())));
-        assert!(known.name(Some("b".into()), Some(&stop)).is_err());
+        known.reserve("b", pause);
+        assert_eq!(known.name(Some("b".into()), Some(pause)), Ok(Named::Again("b".into())));
+        assert!(known.name(Some("b".into()), Some(stop)).is_err());
     }
 
     #[test]
@@ -248,7 +247,7 @@ mod tests {
         let mut known = KnownCommands::default();
         ["o1", "o3"].iter().for_each(|id| known.expect(id));
         assert_eq!(known.name(None, None), Ok(Named::New("o2".into())));
-        assert!(known.name(Some("o3".into()), Some(&Command::Pause {})).is_err());
+        assert!(known.name(Some("o3".into()), Some(1)).is_err());
         known.has_come("o3");
         assert_eq!(known.name(Some("o3".into()), None), Ok(Named::New("o3".into())));
         // One that was given to two commands is the first one's.

@@ -10,11 +10,11 @@ use tombolo_pipelines::language::{
 
 use super::{
     NotFollowed,
-    known::{KnownCommands, KnownOrder, Named},
+    events::Events,
+    known::{KnownCommands, KnownOrder, Named, hash_of},
     order_report::{OrderReport, OrderStatus},
     planner::Rejection,
     room::is_urgent,
-    told::Told,
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
@@ -57,17 +57,17 @@ pub(crate) struct Log {
     state: Mutex<KnownCommands>,
     journal: Journal,
     hub: Option<Arc<Hub>>,
-    told: Told,
+    events: Events,
 }
 
 impl Log {
-    pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>, told: Told) -> Self {
-        Self { state: Mutex::default(), journal, hub, told }
+    pub(crate) fn new(journal: Journal, hub: Option<Arc<Hub>>, events: Events) -> Self {
+        Self { state: Mutex::default(), journal, hub, events }
     }
 
     /// The number of the run, as its events have it; `None` where another rank speaks.
     pub(crate) fn run(&self) -> Option<&str> {
-        self.told.run()
+        self.events.run()
     }
 
     /// Goes on from the commands of an earlier run.
@@ -91,7 +91,8 @@ impl Log {
     /// Keeps the name of a command of an earlier run from others, but for the viewer that sends it
     /// again.
     pub(crate) fn reserve(&self, id: &str, command: &Command) {
-        lock(&self.state).reserve(id, command);
+        let digest = hash_of(command);
+        lock(&self.state).reserve(id, digest);
     }
 
     /// Keeps the names of commands that were given beforehand for them.
@@ -108,7 +109,8 @@ impl Log {
         command: &Command,
         moment: Moment,
     ) {
-        let is_known = lock(&self.state).reserve(id, command);
+        let digest = hash_of(command);
+        let is_known = lock(&self.state).reserve(id, digest);
         self.journal.write(&accepted(id, source, command, moment));
         if !is_known {
             self.admit(id, source, command, moment);
@@ -151,7 +153,9 @@ impl Log {
         wanted: Option<String>,
         command: &Command,
     ) -> Result<Option<String>, String> {
-        let named = lock(&self.state).name(wanted, Some(command))?;
+        // A large one takes a while, in which nobody is to wait.
+        let digest = hash_of(command);
+        let named = lock(&self.state).name(wanted, Some(digest))?;
         match named {
             Named::New(id) => Ok(Some(id)),
             Named::Again(id) => {
@@ -212,7 +216,7 @@ impl Log {
 
     /// Notes and tells a command that is in the journal.
     fn admit(&self, id: &str, source: &Source, command: &Command, moment: Moment) {
-        self.told.accepted(id, source, command, moment);
+        self.events.accepted(id, source, command, moment);
         match command {
             Command::Order(order) => {
                 lock(&self.state).add(id, order, moment.cycle);
@@ -240,7 +244,7 @@ impl Log {
         moment: Moment,
         outcome: Result<(), String>,
     ) {
-        self.told.settled(command, id, source, moment, &outcome);
+        self.events.settled(command, id, source, moment, &outcome);
         self.answer(id, source, moment, &outcome);
         match outcome {
             Ok(()) => self.journal(id, JournalStatus::Applied, moment, None, [None; 2]),
@@ -288,7 +292,8 @@ impl Log {
         self.update_as(id, OrderStatus::name, change);
     }
 
-    /// Does what [`update`](Log::update) does, where the event of a new state has another name for it.
+    /// Does what [`update`](Log::update) does; `named` gives the status that the event of a new state
+    /// shows.
     fn update_as(
         &self,
         id: &str,
@@ -306,7 +311,7 @@ impl Log {
             (order.status != before).then(|| (order.status, order.reason.clone()))
         };
         if let Some((status, reason)) = come_to {
-            self.told.order(id, named(status), reason.as_deref());
+            self.events.order(id, named(status), reason.as_deref());
         }
         self.tell(id);
     }

@@ -13,6 +13,7 @@
 //! journal notes each shape that is handed out, so that a replay gives the same bits.
 
 mod defaults;
+mod events;
 mod forecaster;
 mod known;
 mod lent;
@@ -26,12 +27,12 @@ mod room;
 mod stack;
 mod steerer;
 mod timed;
-mod told;
 mod worker;
 
 use std::{sync::LazyLock, time::Instant};
 
 pub(crate) use defaults::Defaults;
+pub(crate) use events::Events;
 pub(crate) use forecaster::Forecaster;
 pub(crate) use known::KnownCommands;
 pub use lent::NotFollowed;
@@ -45,7 +46,6 @@ pub(crate) use room::Reservation;
 pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::Timed;
-pub(crate) use told::Told;
 
 /// Seconds since the first call of this function: the clock of a
 /// [`Shaper`](tombolo_deform::shape::Shaper).

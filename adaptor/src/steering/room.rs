@@ -54,6 +54,11 @@ pub(crate) struct Reservation {
 }
 
 impl Reservation {
+    /// Counts from now on how long it waits.
+    pub(crate) fn renew(&mut self) {
+        self.since = Instant::now();
+    }
+
     /// How long it has waited.
     pub(crate) fn age(&self) -> Duration {
         self.since.elapsed()

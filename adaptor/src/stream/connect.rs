@@ -21,7 +21,7 @@ use tokio_tungstenite::{
         protocol::{CloseFrame, WebSocketConfig},
     },
 };
-use tombolo_pipelines::language::{RelayAddress, RunName, StreamServer};
+use tombolo_pipelines::language::{RelayAddress, RunName, StreamServer, is_fingerprint};
 use tracing::debug;
 
 use super::{
@@ -310,11 +310,6 @@ fn is_address(text: &str) -> bool {
         && text.ends_with('/')
         && rest.is_some_and(|rest| !rest.starts_with('/'))
         && format!("{text}?token=x").parse::<Link>().is_ok()
-}
-
-/// Whether a text is the SHA-256 fingerprint of a certificate.
-fn is_fingerprint(text: &str) -> bool {
-    text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit())
 }
 
 /// Why a relay does not let a run in.

@@ -87,6 +87,12 @@ impl AllSeries {
     }
 }
 
+/// Whether a file lies in a directory or in one below it.
+fn is_below(directory: &Path, file: &Path) -> bool {
+    let mut below = file.strip_prefix(directory).into_iter().flat_map(Path::components).peekable();
+    below.peek().is_some() && below.all(|component| matches!(component, Component::Normal(_)))
+}
+
 impl Files {
     fn begin(path: &Path, keep: Option<NonZeroU32>, since: Option<f64>) -> Result<Self, FileError> {
         match (keep, since) {
@@ -98,7 +104,10 @@ impl Files {
             (Some(_), None) => Ok(Self::Newest(Newest::default())),
             (Some(keep), Some(since)) => {
                 let most = keep.get() as usize;
-                let found: Vec<_> = Series::entries(path)?.take(most.saturating_add(1)).collect();
+                let directory = path.parent().unwrap_or(Path::new(""));
+                // Whoever wrote it, nothing elsewhere is deleted.
+                let found = Series::entries(path)?.filter(|(_, file)| is_below(directory, file));
+                let found: Vec<_> = found.take(most.saturating_add(1)).collect();
                 // More than are kept: they were written when all were to stay, and do.
                 if found.len() > most {
                     return Ok(Self::Newest(Newest::default()));

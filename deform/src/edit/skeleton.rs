@@ -70,7 +70,9 @@ impl SkeletonEditor {
     /// Extracts the skeleton when it is called, on whatever thread that is.
     pub fn in_advance(&self) -> impl FnOnce() + Send + 'static + use<> {
         let (skeleton, surface) = (Arc::clone(&self.skeleton), Arc::clone(&self.surface));
-        move || drop(extracted(&skeleton, &surface, &Cancellation::default()))
+        let cancellation = self.cancellation.clone();
+        // Who waits for it is given up with it, and extracts it once it is wanted again.
+        move || drop(extracted(&skeleton, &surface, &cancellation))
     }
 
     /// Takes this skeleton for that of the surface.

@@ -257,8 +257,8 @@ impl Shaper {
     /// By which another thread has a plan under way given up: it is refused with
     /// [`Refused::Cancelled`] at the next look, in the set-up, the iterations of a solve and the
     /// checks, and so are those that follow until [`Cancellation::renew`]; with
-    /// [other solvers](Self::with_solvers) their set-up and solves are finished first. Of one process alone: of several ranks each would have to be
-    /// told in the same moment.
+    /// [other solvers](Self::with_solvers) their set-up and solves are finished first. Of one process
+    /// alone: of several ranks each would have to be told in the same moment.
     #[must_use]
     pub fn cancellation(&self) -> &Cancellation {
         &self.body.cancellation

@@ -93,7 +93,7 @@ impl Motion {
             self.now = along;
             self.is_free = false;
         } else if self.is_free || self.begin(topology, &wanted, bound, message)?.is_none() {
-            self.free(topology, &wanted, bound, message)?;
+            self.encode_free(topology, &wanted, bound, message)?;
         }
         self.last = Some(wanted);
         Ok(())
@@ -133,7 +133,7 @@ impl Motion {
     /// Codes the displacement from the reference, finer than the bound by what is lost to rounding
     /// when it is taken and added again. Where that is all of the bound, it is coded exactly; where
     /// even this is not near enough, the positions themselves are, as a displacement from zero.
-    fn free(
+    fn encode_free(
         &mut self,
         topology: &Topology,
         wanted: &[f64],

@@ -88,8 +88,8 @@ pub enum SinceError {
 impl Since {
     /// Reads what a run did after a checkpoint, and what the runs did that have gone on from there
     /// since: each may have been killed before it had a checkpoint of its own. What a later one did
-    /// holds; what it had not come to again is still to come. A torn last line is passed over. No
-    /// more is kept in memory than what may wait in a run.
+    /// holds; what it had not come to again is still to come. A torn last line is passed over. Of
+    /// commands no more is kept in memory than may wait in a run; of shapes what was handed out.
     ///
     /// # Errors
     /// [`SinceError`], which names the line.
@@ -276,11 +276,14 @@ impl Reader {
         } else if self.has_checkpoint {
             let comes_late = self.last_given_again == Some(cycle);
             // One that is new here was accepted before, and is in the checkpoint.
-            self.taken(id.clone(), true)?.outcome = match status {
+            let outcome = match status {
                 OrderStatus::Applied => Outcome::Applied { cycle, comes_late },
                 _ => Outcome::Rejected { cycle, reason: reason.unwrap_or_default() },
             };
-            self.history.settled.retain(|(known, _)| *known != id);
+            let taken = self.taken(id.clone(), true)?;
+            if std::mem::replace(&mut taken.outcome, outcome) != (Outcome::Open {}) {
+                self.history.settled.retain(|(known, _)| *known != id);
+            }
             self.history.settled.push((id, cycle));
         } else if self.taken.remove(&id).is_some() {
             // Before the checkpoint what is settled is known to it.

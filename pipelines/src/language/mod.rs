@@ -96,7 +96,7 @@ pub use reductions::{
     TimeStatistics, Viscosity, WallShearStress, Weight,
 };
 pub use relative_files::resolve_files;
-pub use relay_address::{RelayAddress, RunName};
+pub use relay_address::{RelayAddress, RunName, is_fingerprint};
 pub use render::{Color, ColorMap, Component, Render, Shading};
 pub use sinks::{Csv, Existing, Log, LogLevel};
 pub use stage::{Action, ErrorBound, OrderStage, Select, Stage, StreamStage, Write};

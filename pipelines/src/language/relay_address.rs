@@ -101,11 +101,7 @@ impl FromStr for RelayAddress {
         }
         let sha256 = match fragment.map(|fragment| fragment.strip_prefix("sha256=")) {
             None => None,
-            Some(Some(digits))
-                if digits.len() == 64 && digits.chars().all(|c| c.is_ascii_hexdigit()) =>
-            {
-                Some(digits.to_ascii_lowercase())
-            }
+            Some(Some(digits)) if is_fingerprint(digits) => Some(digits.to_ascii_lowercase()),
             Some(_) => {
                 return Err(wrong("its fingerprint is not sha256= and 64 hexadecimal digits"));
             }
@@ -212,6 +208,12 @@ impl<'de> Deserialize<'de> for RunName {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
     }
+}
+
+/// Whether a text is the SHA-256 fingerprint of a certificate, in 64 hexadecimal digits.
+#[must_use]
+pub fn is_fingerprint(text: &str) -> bool {
+    text.len() == 64 && text.chars().all(|c| c.is_ascii_hexdigit())
 }
 
 #[cfg(test)]

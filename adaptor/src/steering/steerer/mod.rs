@@ -552,7 +552,7 @@ mod tests {
     use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
 
     use super::*;
-    use crate::{journal::Journal, steering::Told};
+    use crate::{journal::Journal, steering::Events};
 
     /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
     #[test]
@@ -560,7 +560,7 @@ mod tests {
         let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
         let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
         let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
-        let log = Arc::new(Log::new(Journal::none(), None, Told::default()));
+        let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
         let steerer =
             Steerer::new(shaper, Defaults::default(), log, Arc::default(), false).unwrap();
         let planner = Arc::clone(&steerer.planner);

@@ -55,7 +55,7 @@ pub(super) async fn attach(
         if let Err(reason) = keep(&mut socket, &relay, &connection, &host).await {
             let address = connection.address();
             tracing::warn!(%address, reason, "a run from {address} was not taken in: {reason}");
-            let close = CloseFrame { code: REFUSED, reason: fitting(&reason).into() };
+            let close = CloseFrame { code: REFUSED, reason: truncated(&reason).into() };
             let _ = socket.send(Message::Close(Some(close))).await;
         }
     })
@@ -63,7 +63,7 @@ pub(super) async fn attach(
 
 /// The beginning of a reason that a close frame has room for. A longer one would be no frame, and the
 /// run would never read why.
-fn fitting(reason: &str) -> &str {
+fn truncated(reason: &str) -> &str {
     let ends = reason.char_indices().map(|(at, c)| at + c.len_utf8());
     let end = ends.take_while(|&end| end <= REASON).last().unwrap_or_default();
     reason.get(..end).unwrap_or_default()
@@ -186,8 +186,8 @@ mod tests {
 
     #[test]
     fn a_reason_fits_into_a_close_frame() {
-        assert_eq!(fitting("short"), "short");
-        assert_eq!(fitting(&"x".repeat(500)).len(), REASON);
-        assert_eq!(fitting(&"é".repeat(500)), "é".repeat(61));
+        assert_eq!(truncated("short"), "short");
+        assert_eq!(truncated(&"x".repeat(500)).len(), REASON);
+        assert_eq!(truncated(&"é".repeat(500)), "é".repeat(61));
     }
 }

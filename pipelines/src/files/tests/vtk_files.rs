@@ -93,8 +93,6 @@ fn negative_tags_keep_their_names() {
     assert_eq!(back.names, [(back.tags[0], "feature--5".to_owned())]);
 }
 
-/// Names that stand in an array of text, as they were written up to now and as other programs may
-/// write them.
 #[test]
 fn features_of_vertices_keep_their_names() {
     let folder = tempfile::tempdir().unwrap();
@@ -110,6 +108,8 @@ fn features_of_vertices_keep_their_names() {
     }
 }
 
+/// Names that stand in an array of text, as they were written up to now and as other programs may
+/// write them.
 #[test]
 fn names_as_text_are_read() {
     let text = |field_data: &str| {

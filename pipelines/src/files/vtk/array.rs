@@ -48,14 +48,14 @@ impl Stored {
         }
     }
 
-    /// The first `count` values from their bytes, or all, where they are bits; of numbers always all.
-    /// Bytes beyond the last whole number are not looked at.
+    /// The values from their bytes; of bits the first `count`, and none where that is not known, so that
+    /// no more memory is taken than the file warrants. Bytes beyond the last whole number are not
+    /// looked at.
     pub fn decode(self, bytes: &[u8], big_endian: bool, count: Option<u64>) -> Numbers {
         let number = match self {
             Stored::Number(number) => number,
             Stored::Bit => {
-                let count =
-                    count.map_or(usize::MAX, |it| usize::try_from(it).unwrap_or(usize::MAX));
+                let count = usize::try_from(count.unwrap_or(0)).unwrap_or(usize::MAX);
                 let bits = bytes.iter().flat_map(|byte| (0..8).map(move |bit| byte << bit >> 7));
                 return Numbers::Integer(bits.take(count).map(i64::from).collect());
             }

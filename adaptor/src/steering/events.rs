@@ -13,13 +13,13 @@ use crate::{
 
 /// Tells of a run, by its number.
 #[derive(Clone, Default)]
-pub(crate) struct Told {
+pub(crate) struct Events {
     /// `None` where another rank speaks.
     run: Option<Arc<str>>,
     clock: Arc<Clock>,
 }
 
-impl Told {
+impl Events {
     pub(crate) fn new(run: Option<Arc<str>>, clock: Arc<Clock>) -> Self {
         Self { run, clock }
     }
