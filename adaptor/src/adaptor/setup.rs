@@ -101,7 +101,7 @@ impl Adaptor {
         let clock: Arc<Clock> = hub.as_ref().map(|hub| Arc::clone(&hub.clock)).unwrap_or_default();
         clock.set(moment);
         let events = Events::new(first.then(|| Arc::clone(&run)), Arc::clone(&clock));
-        let log = Arc::new(Log::new(journal, hub.clone(), told));
+        let log = Arc::new(Log::new(journal, hub.clone(), events));
         log.resume_notes(notes);
         let config = Arc::new(config);
         let mut pipelines =

@@ -3,7 +3,7 @@
 use std::{
     collections::{HashMap, VecDeque},
     num::NonZeroU32,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     sync::Arc,
 };
 
