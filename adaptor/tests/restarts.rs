@@ -281,7 +281,7 @@ impl Killed {
         let begun = journal.rfind("{\"run\":").unwrap();
         let mark = mark.max(begun + journal[begun..].find('\n').unwrap() + 1);
         let end = mark + self.random.u64(..(journal.len() - mark) as u64 + 1) as usize;
-        let end = journal.floor_char_boundary(end);
+        let end = (0..=end).rev().find(|&end| journal.is_char_boundary(end)).unwrap();
         std::fs::write(self.file(), &journal[..end]).unwrap();
         let whole = journal[..end].rsplit_once('\n').map_or("", |(whole, _)| whole);
         let has =
