@@ -1271,6 +1271,7 @@ contains
     status = c_stop(run%handle)
   end function
 
+  ! Whether a tombolo_execute has said that the run is to end, on all ranks alike; not before the first.
   logical function tombolo_stopped(run)
     type(tombolo_run), intent(in) :: run
     tombolo_stopped = c_stopped(run%handle) /= 0

@@ -250,7 +250,8 @@ int tombolo_release_shape(tombolo* run, const char* reason);
  * paused goes on then, and the tombolo_execute that is under way, or the next, says that the run is stopped, on all ranks. It counts on
  * rank 0. */
 int tombolo_stop(tombolo* run);
-/* 1 once the run is to end, else 0, and 0 while another thread is in a call; 1 of a run that has ended or is not open. */
+/* 1 once a tombolo_execute has said that the run is to end, on all ranks alike, else 0, and 0 while another thread is in a call; 1 of a
+ * run that has ended or is not open. A run that was asked before its first tombolo_execute says so in it, and 0 until then. */
 int tombolo_stopped(tombolo* run);
 
 /* ---- Orders, on rank 0. */

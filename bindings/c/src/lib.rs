@@ -314,7 +314,7 @@ mod tests {
             Ok(())
         };
         assert_eq!(answer(|| with(run, in_a_call)), 0);
-        assert_eq!(stopped(), 1, "it was asked before it began");
+        assert_eq!(stopped(), 0, "the first step tells it, on all ranks");
         assert_eq!(answer(|| with(run, Opened::end)), 0);
         assert_eq!((stopped(), stop()), (1, WRONG_CALL));
         runs().open.remove(&run.addr());

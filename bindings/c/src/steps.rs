@@ -153,7 +153,8 @@ export! {
         let Some(run) = try_hold(&entry.run) else { return Ok(0) };
         // A solver whose run is not there any more is not to go on for ever.
         Ok(match &run.stage {
-            Stage::Opened(_) => c_int::from(Ending::of(&entry.ending).is_asked()),
+            // What was asked of this rank alone, all learn in the first `tombolo_execute`.
+            Stage::Opened(_) => 0,
             Stage::UnderWay(under_way) => c_int::from(under_way.asked().stop),
             Stage::Ended => 1,
         })
