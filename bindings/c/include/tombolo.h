@@ -215,7 +215,8 @@ int tombolo_field_strided(tombolo* run, const char* channel, const char* name, e
 
 /* ---- Each step. */
 
-/* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). */
+/* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). A cycle beyond INT64_MAX is refused as the
+ * negative number that it was before it was converted. */
 int tombolo_execute(tombolo* run, uint64_t cycle, double time, double time_step);
 /* Saves the state of the run in a file, which is there whole or not at all: the shape, the schedule under way, the orders that wait, the
  * parameters. To be called with the solver's own state at the end of the step that the last tombolo_execute has begun, on all ranks; an
