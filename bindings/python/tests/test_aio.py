@@ -15,6 +15,8 @@ def test_a_run_in_async(solver, run):
         await aio.wait_for(lambda: run.features, 30)
         forecast, status = await asyncio.gather(aio.forecast(SQUEEZE, timeout=60), aio.wait_for_cycle(3, 30))
         assert forecast.outcome == "applied" and status.cycle >= 3
+        with pytest.raises(TypeError, match="replaces"):
+            await aio.forecast(SQUEEZE, replaces="another")
         order = await aio.order(SQUEEZE)
         await order.wait(60)
         assert order.status == "applied"
