@@ -293,6 +293,10 @@ fn no_rank_waits_for_one_that_goes_wrong() {
         .env("TOMBOLO_ORDERS", &orders)
         .env("TOMBOLO_PIPELINES", &pipelines);
     let told = succeed(&mut run);
+    // The same order moves cubes that are blocks, without the files.
+    let nothing = directory.path().join("nothing.json");
+    std::fs::write(&nothing, json!({"version": 1}).to_string()).expect("a file");
+    succeed(run.arg("blocks").env("TOMBOLO_PIPELINES", &nothing));
     assert!(
         told.contains(
             "rank 1: 'catalyst/channels/solid/data/topologies/mesh/elements/shape': found 'cube'"

@@ -25,12 +25,14 @@ const MESH: Names = ("mesh", "coords");
 const SURFACE: Names = ("surface", "surface");
 
 /// Fills in what was asked. `blocks` are the names of the steered channel's meshes and how many
-/// vertices each has; none of a rank without data, which is answered with a mesh of no points.
+/// vertices each has; none of a rank without data, which is answered with a mesh of no points, or
+/// without any mesh where its channel is said to have several (`has_blocks`).
 pub(crate) fn fill(
     node: &mut NodeMut<'_>,
     asked: &Asked,
     channel: &str,
     blocks: &[(String, usize)],
+    has_blocks: bool,
 ) {
     // What an earlier call left would be taken for new.
     node.remove(&format!("catalyst/{STEERING}"));
@@ -42,7 +44,7 @@ pub(crate) fn fill(
     let root = format!("catalyst/{channel}");
     let mut first = 0;
     let without_data = [(String::new(), 0)];
-    let blocks = if blocks.is_empty() { &without_data } else { blocks };
+    let blocks = if blocks.is_empty() && !has_blocks { &without_data } else { blocks };
     let is_single = matches!(blocks, [(name, _)] if name.is_empty());
     for (name, count) in blocks {
         let end = first + count;

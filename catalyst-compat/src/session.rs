@@ -18,6 +18,9 @@ pub(crate) struct Session {
     stage: Stage,
     communicator: Arc<dyn Communicator>,
     groups: Groups,
+    /// The channels of the last step that are said to have several meshes, though this rank may
+    /// have none of them.
+    with_blocks: Vec<String>,
 }
 
 enum Stage {
@@ -65,7 +68,7 @@ impl Session {
         } else {
             Stage::UnderWay(Box::new(Run::new(settings)?))
         };
-        let mut session = Self { stage, communicator, groups };
+        let mut session = Self { stage, communicator, groups, with_blocks: Vec::new() };
         if session.communicator.rank() == 0 {
             notes.iter().for_each(|note| eprintln!("tombolo: {note}"));
         }
@@ -155,6 +158,7 @@ impl Session {
         self.choose(state.child(c"pipelines").or_else(|| catalyst.child(c"pipelines")).as_ref())?;
         let looked_at = self.under_way().is_none_or(|run| run.looks_at(&step));
         let mut channels = Vec::new();
+        self.with_blocks.clear();
         if let Some(all) = catalyst.child(c"channels") {
             if !matches!(all.kind(), Kind::Object | Kind::Empty) {
                 return Err(all.wrong("an object of channels by their names"));
@@ -168,6 +172,9 @@ impl Session {
                     );
                 }
                 channels.push(mesh::read(channel, looked_at)?);
+                if mesh::has_blocks(channel) {
+                    self.with_blocks.push(channel.name().into_owned());
+                }
                 Ok(())
             })?;
         }
@@ -220,9 +227,10 @@ impl Session {
         match &self.stage {
             Stage::UnderWay(run) => {
                 let (steered, blocks) = run.steered();
-                results::fill(node, run.asked(), steered, blocks);
+                let has_blocks = self.with_blocks.iter().any(|name| name == steered);
+                results::fill(node, run.asked(), steered, blocks, has_blocks);
             }
-            Stage::Waiting { asked, .. } => results::fill(node, asked, "", &[]),
+            Stage::Waiting { asked, .. } => results::fill(node, asked, "", &[], false),
         }
     }
 

@@ -125,10 +125,12 @@ def _edits(data):
     return json.loads((vtk.texts(data, "edits") or ["[]"])[0])
 
 
-def _as_edit(vertices, moved):
-    """A displacement as an edit of the vertices that move."""
+def _as_edits(vertices, moved):
+    """A displacement as an edit of the vertices that move; none where nothing does."""
     kept = np.flatnonzero(np.any(moved != 0, axis=1))
-    return {"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}
+    if len(kept) == 0:
+        return []
+    return [{"displacement": {"vertices": vertices[kept].tolist(), "values": moved[kept].tolist()}}]
 
 
 def _edits_or_displacement(data):
@@ -136,7 +138,7 @@ def _edits_or_displacement(data):
     edits = _edits(data)
     if edits or not data.GetPointData().HasArray("displacement"):
         return edits
-    return [_as_edit(_vertices(data), _displacement(data, "displacement"))]
+    return _as_edits(_vertices(data), _displacement(data, "displacement"))
 
 
 def _of_points(edits, data):
@@ -539,7 +541,7 @@ class TomboloOrder(_Algorithm):
             if not np.array_equal(surface.vertices[at], vertices):
                 raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
             moved = vtk.points(data) - surface.points[at]
-        return [_as_edit(vertices, moved)]
+        return _as_edits(vertices, moved)
 
     def _ask(self, request):
         """Asks for something, and tells what is wrong each time."""

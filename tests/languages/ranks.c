@@ -95,16 +95,20 @@ static double points[24];
 static const int32_t hex[8] = { 0, 1, 3, 2, 4, 5, 7, 6 };
 static double heat[8];
 
-/* Rank 2 has no cells, and does not even name the channel. */
+/* Whether the channel's cubes are blocks. */
+static int has_blocks;
+
+/* Rank 2 has no cells, and does not even name the channel, or says no more than its type. */
 static conduit_node* step(int cycle)
 {
   conduit_node* node = conduit_node_create();
   conduit_node_set_path_int32(node, "catalyst/state/timestep", cycle);
   conduit_node_set_path_float64(node, "catalyst/state/time", cycle);
-  if (rank == 2) return node;
+  if (rank == 2 && !has_blocks) return node;
   conduit_node* channel = conduit_node_fetch(node, "catalyst/channels/solid");
-  conduit_node_set_path_char8_str(channel, "type", "mesh");
-  conduit_node* mesh = conduit_node_fetch(channel, "data");
+  conduit_node_set_path_char8_str(channel, "type", has_blocks ? "multimesh" : "mesh");
+  if (rank == 2) return node;
+  conduit_node* mesh = conduit_node_fetch(channel, has_blocks ? "data/cube" : "data");
   conduit_node_set_path_char8_str(mesh, "coordsets/coords/type", "explicit");
   const char* axes[] = { "x", "y", "z" };
   for (int axis = 0; axis < 3; ++axis) {
@@ -119,6 +123,7 @@ static conduit_node* step(int cycle)
   conduit_node_set_path_char8_str(mesh, "fields/heat/association", "vertex");
   conduit_node_set_path_char8_str(mesh, "fields/heat/topology", "mesh");
   conduit_node_set_path_external_float64_ptr(mesh, "fields/heat/values", heat, 8);
+  if (has_blocks) return node;
   touching(conduit_node_fetch(node, "catalyst/channels"));
   levels(conduit_node_fetch(node, "catalyst/channels"));
   across(conduit_node_fetch(node, "catalyst/channels"));
@@ -133,6 +138,24 @@ static int run(conduit_node* node)
   return status;
 }
 
+/* An order moves blocks; the rank without one finds what the others do, without a mesh. */
+static void blocks_that_move(conduit_node* setup)
+{
+  has_blocks = 1;
+  expect("initialize with blocks", (int)catalyst_initialize(setup), 0);
+  for (int cycle = 0; cycle < 3; ++cycle) expect("a step of blocks", run(step(cycle)), 0);
+  conduit_node* results = conduit_node_create();
+  expect("results of blocks", (int)catalyst_results(results), 0);
+  const int is_multimesh = conduit_node_has_path(results, "catalyst/solid/type") &&
+    strcmp(conduit_node_fetch_path_as_char8_str(results, "catalyst/solid/type"), "multimesh") == 0;
+  expect("blocks that move, of every rank", is_multimesh, 1);
+  const int has_cube = conduit_node_has_path(results, "catalyst/solid/cube/coordsets/coords/values/x");
+  expect("a cube of each rank that has one", has_cube == (rank < 2) && !conduit_node_has_path(results, "catalyst/solid/coordsets"), 1);
+  expect("finalize with blocks", (int)catalyst_finalize(setup), 0);
+  conduit_node_destroy(results);
+  conduit_node_destroy(setup);
+}
+
 int main(int argc, char** argv)
 {
   MPI_Init(&argc, &argv);
@@ -145,6 +168,11 @@ int main(int argc, char** argv)
   }
   conduit_node* setup = conduit_node_create();
   conduit_node_set_path_int32(setup, "catalyst/mpi_comm", MPI_Comm_c2f(MPI_COMM_WORLD));
+  if (argc > 1) {
+    blocks_that_move(setup);
+    MPI_Finalize();
+    return 0;
+  }
   conduit_node* wrong = conduit_node_create();
   conduit_node_set_node(wrong, setup);
   if (rank == 1) conduit_node_set_path_char8_str(wrong, "catalyst/scripts/a/filename", "no-such-file.json");

@@ -197,18 +197,23 @@ impl Run {
         // What can be wrong here alone is agreed upon before anything that all do together.
         let mut is_other = false;
         let prepared = self.cover(given).and_then(|Shown { step, looked_at, channels }| {
+            let mut may_tell = looked_at;
             for channel in &channels {
                 let changed = self.update(channel, looked_at)?;
+                may_tell |= changed;
                 is_other |= changed && channel.name == self.steered;
             }
-            Ok((step, channels))
+            Ok((step, channels, may_tell))
         });
-        let ((step, mut channels), is_other) =
+        let ((step, mut channels, may_tell), is_other) =
             ranks::agree_and_ask(&*self.communicator, prepared, is_other, self.choice)?;
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
-        self.tell(&channels);
+        // What is passed over can be new only where something was read.
+        if may_tell {
+            self.tell(&channels);
+        }
         // A solver that shows nothing yet is asked for nothing.
         if channels.is_empty() {
             return Ok(false);
@@ -293,10 +298,10 @@ impl Run {
             return;
         }
         for channel in channels {
-            for note in channel.notes.iter().cloned().chain(channel.passed_over()) {
-                if !self.told.contains(&note) {
+            for note in channel.notes.iter().chain(&channel.passed_over()) {
+                if !self.told.contains(note) {
                     tracing::warn!(run = self.adaptor.run_id(), "{note}");
-                    self.told.insert(note);
+                    self.told.insert(note.clone());
                 }
             }
         }

@@ -1098,16 +1098,12 @@ contains
     status = c_global_cells_i32(run%handle, c_text(channel), c_loc(numbers), size(numbers, kind=c_size_t))
   end function
 
-  ! A negative cycle, which C does not have, is refused.
+  ! A negative cycle, which C does not have, is refused by the library: on all ranks.
   integer(c_int) function execute_cycle(run, cycle, time, time_step) result(status)
     type(tombolo_run), intent(in) :: run
     integer(c_int64_t), intent(in) :: cycle
     real(c_double), intent(in) :: time, time_step
-    if (cycle < 0) then
-      status = c_refuse(c_text("cycle"), c_text(text_of(int(cycle, c_size_t))), c_text("a whole number from 0 on"))
-    else
-      status = c_execute(run%handle, cycle, time, time_step)
-    end if
+    status = c_execute(run%handle, cycle, time, time_step)
   end function
 
   integer(c_int) function execute_int32(run, cycle, time, time_step) result(status)
@@ -1271,6 +1267,7 @@ contains
     status = c_stop(run%handle)
   end function
 
+  ! Whether a tombolo_execute has said that the run is to end, on all ranks alike; not before the first.
   logical function tombolo_stopped(run)
     type(tombolo_run), intent(in) :: run
     tombolo_stopped = c_stopped(run%handle) /= 0

@@ -215,7 +215,8 @@ int tombolo_field_strided(tombolo* run, const char* channel, const char* name, e
 
 /* ---- Each step. */
 
-/* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). */
+/* Shows the state before the step from `time` to `time + time_step` (0 in a steady solver). A cycle beyond INT64_MAX is refused as the
+ * negative number that it was before it was converted. */
 int tombolo_execute(tombolo* run, uint64_t cycle, double time, double time_step);
 /* Saves the state of the run in a file, which is there whole or not at all: the shape, the schedule under way, the orders that wait, the
  * parameters. To be called with the solver's own state at the end of the step that the last tombolo_execute has begun, on all ranks; an
@@ -250,7 +251,8 @@ int tombolo_release_shape(tombolo* run, const char* reason);
  * paused goes on then, and the tombolo_execute that is under way, or the next, says that the run is stopped, on all ranks. It counts on
  * rank 0. */
 int tombolo_stop(tombolo* run);
-/* 1 once the run is to end, else 0, and 0 while another thread is in a call; 1 of a run that has ended or is not open. */
+/* 1 once a tombolo_execute has said that the run is to end, on all ranks alike, else 0, and 0 while another thread is in a call; 1 of a
+ * run that has ended or is not open. A run that was asked before its first tombolo_execute says so in it, and 0 until then. */
 int tombolo_stopped(tombolo* run);
 
 /* ---- Orders, on rank 0. */

@@ -37,14 +37,9 @@ impl Ending {
 
     /// The run has begun, and can be asked to end by this.
     pub(super) fn begin(&mut self, stopper: Stopper) {
-        if self.is_asked() {
+        if matches!(self, Self::Asked) {
             stopper.stop();
         }
         *self = Self::UnderWay(stopper);
-    }
-
-    /// Whether the run was asked to end before it has begun.
-    pub(super) fn is_asked(&self) -> bool {
-        matches!(self, Self::Asked)
     }
 }

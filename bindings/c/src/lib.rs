@@ -278,6 +278,8 @@ pub extern "C" fn tombolo_refuse(what: Text, found: Text, expected: Text) -> c_i
 
 #[cfg(test)]
 mod tests {
+    use tombolo::communicator::{Communicator, threads};
+
     use super::*;
 
     #[test]
@@ -314,11 +316,35 @@ mod tests {
             Ok(())
         };
         assert_eq!(answer(|| with(run, in_a_call)), 0);
-        assert_eq!(stopped(), 1, "it was asked before it began");
+        assert_eq!(stopped(), 0, "the first step tells it, on all ranks");
         assert_eq!(answer(|| with(run, Opened::end)), 0);
         assert_eq!((stopped(), stop()), (1, WRONG_CALL));
         runs().open.remove(&run.addr());
         assert_eq!((stopped(), stop()), (1, WRONG_CALL));
+    }
+
+    #[test]
+    fn a_negative_cycle_of_one_rank_is_refused_on_all() {
+        let output = tempfile::tempdir().expect("a temporary directory");
+        let told = threads::run(2, |ranks| {
+            let cycle = if ranks.rank() == 1 { u64::MAX } else { 0 };
+            let settings = Settings {
+                communicator: Arc::new(ranks),
+                output: output.path().into(),
+                ..Settings::default()
+            };
+            let run = register(Opened::new(Stage::Opened(Box::new(settings))));
+            // SAFETY: the handle is that of an open run without arrays.
+            let status = unsafe { steps::tombolo_execute(run, cycle, 0.0, 0.1) };
+            // SAFETY: the message is this thread's, and a C string.
+            let told = unsafe { CStr::from_ptr(tombolo_message()) }.to_string_lossy().into_owned();
+            assert_eq!(answer(|| with(run, Opened::end)), 0);
+            runs().open.remove(&run.addr());
+            (status, told)
+        });
+        let refused = "cycle: found -1; expected a whole number from 0 on";
+        let of_rank_0 = format!("rank 1: {refused}");
+        assert_eq!(told, [(INVALID, of_rank_0), (INVALID, refused.into())]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_uint};
 use std::ptr;
 
 use tombolo::deform::mesh::Vector;
-use tombolo::foreign::Shown;
+use tombolo::foreign::{RunError, Shown};
 use tombolo::pipelines::language::nearest;
 use tombolo::{ExecuteError, MeshMotion, OrderReport, Step};
 
@@ -35,6 +35,18 @@ fn orders(run: &Opened) -> Vec<OrderReport> {
     }
 }
 
+/// Refuses what was a negative number before it became one without a sign, as Fortran's are.
+fn check_cycle(cycle: u64) -> Result<(), RunError> {
+    match cycle.cast_signed() {
+        0.. => Ok(()),
+        negative => Err(RunError::Argument {
+            what: "cycle".into(),
+            found: negative.to_string(),
+            expected: "a whole number from 0 on".into(),
+        }),
+    }
+}
+
 export! {
     fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64, time_step: f64) {
         with(run, |run| {
@@ -42,11 +54,14 @@ export! {
             run.orders.clear();
             let Stage::UnderWay(under_way) = &mut run.stage else { return Err(Opened::after_the_end()) };
             let _alarm = under_way.alarm();
-            // SAFETY: as the crate's page says: the arrays live while this call runs.
-            let channels: Result<Vec<_>, _> = run.channels.iter().map(|named| unsafe { named.channel() }).collect();
             let step = Step { cycle, time, time_step };
-            let looked_at = under_way.looks_at(&step);
-            let given = channels.map(|channels| Shown { step, looked_at, channels });
+            // Refused with what else is wrong on one rank: the others would wait for it.
+            let given = check_cycle(cycle).and_then(|()| {
+                // SAFETY: as the crate's page says: the arrays live while this call runs.
+                let channels = run.channels.iter().map(|named| unsafe { named.channel() });
+                let channels = channels.collect::<Result<_, _>>()?;
+                Ok(Shown { step, looked_at: under_way.looks_at(&step), channels })
+            });
             if !under_way.execute(given)? {
                 return Err(ExecuteError::NoChannel { cycle }.into());
             }
@@ -153,7 +168,8 @@ export! {
         let Some(run) = try_hold(&entry.run) else { return Ok(0) };
         // A solver whose run is not there any more is not to go on for ever.
         Ok(match &run.stage {
-            Stage::Opened(_) => c_int::from(Ending::of(&entry.ending).is_asked()),
+            // What was asked of this rank alone, all learn in the first `tombolo_execute`.
+            Stage::Opened(_) => 0,
             Stage::UnderWay(under_way) => c_int::from(under_way.asked().stop),
             Stage::Ended => 1,
         })

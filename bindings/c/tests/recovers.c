@@ -173,6 +173,7 @@ static void a_paused_run_is_ended(void)
   /* One that was asked before it began. */
   run = opened(QUALITY, NULL);
   OK(tombolo_stop(run));
+  REQUIRE(!tombolo_stopped(run));
   OK(step(run, 0));
   REQUIRE(tombolo_stopped(run));
   OK(tombolo_close(&run));

@@ -216,12 +216,16 @@ impl Run {
         let looked_at = run.looks_at(&step);
         let given = given.map(|channels| Shown { step, looked_at, channels: channels.0 });
         let call = Call { run, given };
-        let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run))?;
+        let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run));
         drop(lender);
+        // Before the step's own error, lest it be raised by a later call.
         if let Some(error) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            if let Err(refused) = shown {
+                error.set_cause(py, Some(refused));
+            }
             return Err(error);
         }
-        if !shown {
+        if !shown? {
             return Err(of_run(ExecuteError::NoChannel { cycle }.into()));
         }
         let asked = run.asked();

@@ -15,6 +15,8 @@ def test_a_run_in_async(solver, run):
         await aio.wait_for(lambda: run.features, 30)
         forecast, status = await asyncio.gather(aio.forecast(SQUEEZE, timeout=60), aio.wait_for_cycle(3, 30))
         assert forecast.outcome == "applied" and status.cycle >= 3
+        with pytest.raises(TypeError, match="replaces"):
+            await aio.forecast(SQUEEZE, replaces="another")
         order = await aio.order(SQUEEZE)
         await order.wait(60)
         assert order.status == "applied"
@@ -45,19 +47,28 @@ def test_a_run_in_async(solver, run):
     asyncio.run(work())
 
 
-def test_what_is_cancelled_before_the_wheel_is_there_is_not_given(solver):
-    other = tombolo.connect(solver.link)
-    other.drive()
-    with tombolo.connect(solver.link) as run:
-        run.wait_for(lambda: run.features, 30)
-        other.close()
-        # The wheel is kept for that one for some seconds.
-        run.wait_for(lambda: run.status.driver is None, 30)
+def test_what_is_cancelled_before_the_wheel_is_there_is_not_given(solver, monkeypatch):
+    with tombolo.connect(solver.link) as other, tombolo.connect(solver.link) as run:
+        other.drive()
+        run.wait_for(lambda: run.features and run.status.driver, 30)
+        ask_for_wheel = run._ask_for_wheel
+
+        def ask_again(until):
+            # As for a wheel that is kept for one who has left, though this one is there as long as anybody asks.
+            try:
+                return ask_for_wheel(until)
+            except tombolo.NotDriverError:
+                time.sleep(0.05)
+                return False
+
+        monkeypatch.setattr(run, "_ask_for_wheel", ask_again)
 
         async def give():
             asked = (run.aio.order(SQUEEZE), run.aio.undo(), run.aio.set("heating", 7), run.aio.pause())
             ended = await asyncio.gather(*(asyncio.wait_for(it, 0.3) for it in asked), return_exceptions=True)
             assert all(isinstance(it, asyncio.TimeoutError) for it in ended), ended
+            # Whoever went on asking would have the wheel now.
+            other.close()
 
         asyncio.run(give())
         # All its threads have ended, so that nothing can be given any more.
@@ -68,28 +79,43 @@ def test_what_is_cancelled_before_the_wheel_is_there_is_not_given(solver):
 
 def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
     relay = Relay(solver.link)
-    with tombolo.connect(relay.link) as run:
-        run.wait_for(lambda: run.features, 30)
-        run.drive()
-        relay.swallows = True
 
-        def let_through():
-            relay.swallows = False
-            relay.cut()
+    def let_through():
+        relay.swallows = False
+        relay.cut()
 
-        # A program that is held up goes on then.
-        late = threading.Timer(30.0, let_through)
-        late.start()
-        begun = time.monotonic()
+    # A program that is held up goes on then.
+    late = threading.Timer(30.0, let_through)
 
-        async def ask():
-            with pytest.raises(asyncio.TimeoutError):
-                await asyncio.wait_for(run.aio.forecast(SQUEEZE), 0.3)
+    async def ask(aio):
+        send, is_sent = aio._send, asyncio.Event()
 
-        asyncio.run(ask())
-        assert time.monotonic() - begun < 15
+        async def send_and_tell(question):
+            sent = await send(question)
+            is_sent.set()
+            return sent
+
+        aio._send = send_and_tell
+        forecast = asyncio.create_task(aio.forecast(SQUEEZE))
+        await asyncio.wait_for(is_sent.wait(), 20)
+        # It waits for the answer now.
+        await asyncio.sleep(0.1)
+        forecast.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await forecast
+
+    try:
+        with tombolo.connect(relay.link) as run:
+            run.wait_for(lambda: run.features, 30)
+            run.drive()
+            relay.swallows = True
+            late.start()
+            begun = time.monotonic()
+            asyncio.run(ask(run.aio))
+            assert time.monotonic() - begun < 25
+    finally:
         late.cancel()
-    relay.server.close()
+        relay.server.close()
 
 
 def test_events_go_on_after_one_was_waited_for_in_vain(begin):
@@ -106,6 +132,6 @@ def test_events_go_on_after_one_was_waited_for_in_vain(begin):
             return cycles, waited
 
         cycles, waited = asyncio.run(follow())
-    assert waited > 3
+    assert waited > 0
     # None is lost.
     assert cycles == list(range(cycles[0], cycles[0] + 5))

@@ -198,6 +198,12 @@ def test_an_edit_adds_to_what_no_list_of_edits_stands_for_in_plain_vtk(plugin, s
     shaper, _ = expected_of(solver)
     assert np.array_equal(shaper.displacement(edits), moved)
 
+    # What moves nothing is no edit.
+    nothing = plugin.make("TomboloCombine", first, first, Weights=[1, -1])
+    alone = plugin.make("TomboloTranslate", nothing, By=[0, 0, 0.3], **ends)
+    moved = vtk.array(shown(alone).GetPointData(), "displacement")
+    np.testing.assert_allclose(moved[on_top], np.tile([0, 0, 0.3], (on_top.sum(), 1)), atol=1e-12)
+
     before = vtk.array(shown(by_angle).GetPointData(), "displacement")
     numbers = vtk.array(shown(by_angle).GetCellData(), "features")
     names = vtk.texts(shown(by_angle), "feature_names")
@@ -250,7 +256,7 @@ def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
     order.SetArray(None)
     order.SetInputConnection(surface.GetOutputPort())
     reference = tombolo.background.connection(solver.link).surface
-    assert order.edits(SimpleNamespace(surface=reference)) == [{"displacement": {"vertices": [], "values": []}}]
+    assert order.edits(SimpleNamespace(surface=reference)) == []
     other = reference._replace(vertices=reference.vertices + 1)
     with pytest.raises(tombolo.MeshError, match="found other vertices"):
         order.edits(SimpleNamespace(surface=other))

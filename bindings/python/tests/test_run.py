@@ -364,7 +364,10 @@ def test_a_lost_connection_is_made_again(solver):
 
 def test_ctrl_c_ends_a_wait(solver):
     program = f"""
+import signal
 import tombolo
+# What a shell begins in the background ignores Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 run = tombolo.connect({solver.link!r}, watch=True)
 print("waiting", flush=True)
 try:

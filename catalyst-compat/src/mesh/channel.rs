@@ -63,6 +63,13 @@ pub(crate) fn read<'call>(
     Ok(channel)
 }
 
+/// Whether a channel is said to have several meshes by their names; one that is left empty says
+/// nothing.
+pub(crate) fn has_blocks(node: &Node<'_, '_>) -> bool {
+    let kind = node.child(c"type");
+    kind.is_some_and(|kind| kind.text().is_ok_and(|kind| matches!(&*kind, "multimesh" | "amrmesh")))
+}
+
 fn push<'call>(
     channel: &mut Channel<'call>,
     name: String,

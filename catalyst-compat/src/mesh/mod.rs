@@ -8,4 +8,4 @@ mod field;
 mod rows;
 mod topology;
 
-pub(crate) use channel::read;
+pub(crate) use channel::{has_blocks, read};

@@ -90,15 +90,24 @@ impl<'call> Topology<'call> {
             Topology::Polyhedral { .. } => 3,
             Topology::Mixed { shapes, map, label, .. } => {
                 memory::check(shapes, || label.clone())?;
-                let dimensions = map.iter().map(|(_, cell_type)| cell_type.dimension());
-                let most = dimensions.max().unwrap_or(0);
                 let mut highest = 0;
+                // The types that would still raise it: each is met once.
+                let mut higher: Vec<(i64, usize)> = Vec::new();
+                for (number, of) in map {
+                    if !higher.iter().any(|(known, _)| known == number) {
+                        higher.push((*number, of.dimension()));
+                    }
+                }
+                higher.retain(|(_, dimension)| *dimension > highest);
                 for cell in 0..shapes.len() {
-                    let number = shapes.integer(cell);
-                    let known = map.iter().find(|(known, _)| Some(*known) == number);
-                    highest = known.map_or(highest, |(_, of)| of.dimension().max(highest));
-                    if highest == most {
+                    if higher.is_empty() {
                         break;
+                    }
+                    let number = shapes.integer(cell);
+                    let met = higher.iter().find(|(known, _)| Some(*known) == number);
+                    if let Some(&(_, dimension)) = met {
+                        highest = dimension;
+                        higher.retain(|(_, dimension)| *dimension > highest);
                     }
                 }
                 highest

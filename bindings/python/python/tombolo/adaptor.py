@@ -264,7 +264,8 @@ class Adaptor:
 
         The arrays are borrowed for the length of the call and must not change meanwhile; other threads of Python run.
         Where nothing is due, nothing is copied, and it costs some microseconds. While a run is paused, or waits for its
-        first viewer, the handlers of signals run. What one raises, as Ctrl-C does, stops the run, and is raised here.
+        first viewer, the handlers of signals run, on rank 0 alone. What one raises, as Ctrl-C does, stops the run, and
+        is raised here.
 
         Parameters
         ----------

@@ -111,18 +111,36 @@ class AsyncRun:
     def __init__(self, run: Run) -> None:
         self.run = run
 
-    async def order(self, edits: Edits, **settings: Any) -> AsyncOrder:
+    async def order(
+        self,
+        edits: Edits,
+        *,
+        schedule: Optional[Mapping[str, Any]] = None,
+        deform: Optional[Mapping[str, Any]] = None,
+        guard: Optional[Mapping[str, Any]] = None,
+        replaces: Union[Order, str, None] = None,
+    ) -> AsyncOrder:
         """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
-        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        text, name = await asyncio.to_thread(
+            lambda: _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+        )
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(text, name))))
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(count))))
 
-    async def forecast(self, edits: Edits, *, timeout: Optional[float] = None, **settings: Any) -> Forecast:
+    async def forecast(
+        self,
+        edits: Edits,
+        *,
+        schedule: Optional[Mapping[str, Any]] = None,
+        deform: Optional[Mapping[str, Any]] = None,
+        guard: Optional[Mapping[str, Any]] = None,
+        timeout: Optional[float] = None,
+    ) -> Forecast:
         """As `Run.forecast`."""
-        text, name = await asyncio.to_thread(lambda: _text(edits, **settings))
+        text, name = await asyncio.to_thread(lambda: _text(edits, schedule=schedule, deform=deform, guard=guard))
         question = await self._send(lambda client: client.forecast(text, name))
         return await _in_slices(lambda left: self.run._foretold(question, left), timeout)
 
