@@ -241,7 +241,8 @@ fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
     for (offset, size, bound) in [(1000.0, 1.0, 2.9e-13), (5e6, 1.0, 2.5e-9), (0.0, 1e6, 1e-12)] {
         let still: Vec<[f64; 3]> =
             sheet.iter().map(|point| point.map(|x| offset + size * x)).collect();
-        let coded = check(&still, &triangles, &[], bound / 2.0);
+        // The positions of a topology are on a grid of less than 2^28 steps.
+        let coded = check(&still, &triangles, &[], 1e-6 * size);
         let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
         let mut state = 1_u64;
         let mut random = || {

@@ -180,7 +180,9 @@ class Relay:
     def cut(self):
         pairs, self.pairs = self.pairs, []
         for one in (one for pair in pairs for one in pair):
-            one.shutdown(socket.SHUT_RDWR)
+            # One that has ended by itself is not connected any more.
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
             one.close()
 
 
