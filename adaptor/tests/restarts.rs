@@ -355,6 +355,41 @@ fn what_was_accepted_after_the_checkpoint_is_done_again() {
 }
 
 #[test]
+fn an_order_is_carried_out_once_where_a_restarted_run_is_saved_before_it_has_come_to_it() {
+    let output = tempfile::tempdir().unwrap();
+    let file = output.path().join("journal.jsonl");
+    let mut solver = Solver::new(settings(output.path(), true));
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step();
+    viewer.send(&json!({"id": "squeeze", "order": squeeze(0.2)}));
+    viewer.wait_for("order", |order| order["status"] == "accepted");
+    // It is being planned.
+    solver.step();
+    let mut saved = (solver.adaptor.checkpoint(), solver.mesh.clone(), solver.cycle);
+    drop((solver, viewer));
+    for _ in 0..2 {
+        wait_for_lock(&file);
+        let mut again = Solver::new(settings(output.path(), true).restart(saved.0.clone()));
+        saved.0 = again.adaptor.checkpoint();
+    }
+    wait_for_lock(&file);
+    let mut last = Solver::new(settings(output.path(), true).restart(saved.0));
+    (last.mesh, last.cycle) = (saved.1, saved.2);
+    for _ in 0..40 {
+        last.step();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let orders = last.finish().orders;
+    let squeezes: Vec<_> = orders.iter().filter(|order| order.id == "squeeze").collect();
+    assert_eq!(squeezes.len(), 1, "{orders:?}");
+    assert_eq!(squeezes[0].status, OrderStatus::Applied, "{orders:?}");
+    let journal = std::fs::read_to_string(&file).unwrap();
+    let applied = journal.matches(r#"{"id":"squeeze","status":"applied""#).count();
+    assert_eq!(applied, 1, "{journal}");
+}
+
+#[test]
 fn several_ranks_go_on_from_one_file() {
     const RANKS: usize = 3;
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);

@@ -5,7 +5,7 @@
 //! Behind the end of that journal the run goes on by itself.
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{HashMap, HashSet, VecDeque},
     fs::File,
     io::BufReader,
     path::Path,
@@ -195,7 +195,11 @@ impl Again {
             by: CommandAuthor::Program,
             command: Command::Order(order.clone()),
         });
-        let of_checkpoint = orders.chain(run.waiting.iter().cloned()).map(|saved| {
+        // One that was still to be carried out again when the checkpoint was made is in both lists.
+        let mut known = HashSet::new();
+        let of_checkpoint = orders.chain(run.waiting.iter().cloned());
+        let of_checkpoint = of_checkpoint.filter(|saved| known.insert(saved.id.clone()));
+        let of_checkpoint = of_checkpoint.map(|saved| {
             let SavedCommand { id, by, command } = saved;
             let outcome = Outcome::Open {};
             let new = Taken { id, by: by.clone(), command: None, outcome, is_before: true };

@@ -373,6 +373,7 @@ impl Shared {
             }
             state.since = Some(Instant::now());
             last = state.since;
+            let is_last = state.is_closed;
             drop(state);
             let written = store.append(&text);
             state = lock(&self.state);
@@ -414,7 +415,8 @@ impl Shared {
             settled.into_iter().for_each(|settle| settle(outcome.clone()));
             state = lock(&self.state);
             if trouble.is_some() {
-                if state.is_closed {
+                // Once it is closed it is tried once more.
+                if is_last {
                     break;
                 }
                 let until = Instant::now() + PAUSE;
