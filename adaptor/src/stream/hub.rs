@@ -416,15 +416,13 @@ impl Hub {
     }
 
     /// Tells viewers the last status, and that and how the run has ended; what they have not read of
-    /// it comes before.
+    /// it comes before, and nothing behind.
     pub(super) fn tell_end(&self) {
         self.status();
         let Moment { cycle, time } = self.clock.get();
         let how = lock(&self.state).end.name();
-        self.tell(move || json!({"end": {"how": how, "cycle": cycle, "time": time}}));
-        for client in lock(&self.state).clients.values() {
-            client.end();
-        }
+        let end = Text::of(move || json!({"end": {"how": how, "cycle": cycle, "time": time}}));
+        lock(&self.state).audience().for_each(|client| client.end(Some(&end)));
     }
 
     /// Whether anybody is connected.

@@ -88,7 +88,7 @@ impl Hub {
         if is_unfinished {
             self.tell_end();
         }
-        observer.end();
+        observer.end(None);
     }
 
     /// Tells nothing more to the observer.
@@ -128,5 +128,25 @@ mod tests {
         assert!(matches!(early.next(), Some(Observed::Text(_))));
         let late = Observer::of(&hub).unwrap();
         assert!(matches!(late.next(), Some(Observed::Hello)));
+    }
+
+    #[test]
+    fn how_the_run_has_ended_is_the_last_that_is_told() {
+        let hub = Hub::default();
+        hub.describe(Map::new);
+        let observer = Observer::of(&hub).unwrap();
+        hub.tell_end();
+        hub.tell(|| json!({"people": []}));
+        hub.status();
+        let mut told = Vec::new();
+        while let Some(message) = observer.next() {
+            match message {
+                Observed::Text(text) => told.push(text.written()),
+                Observed::End => break,
+                _ => {}
+            }
+        }
+        assert!(told.last().is_some_and(|last| last.contains("\"end\"")), "{told:?}");
+        assert!(told.len() == 2 && told[0].contains("\"status\""), "{told:?}");
     }
 }

@@ -145,8 +145,9 @@ struct Outbox {
     sent: u64,
     /// The connection is to be closed at once, with this code and reason.
     closing: Option<Closing>,
-    /// Nothing comes any more.
+    /// Nothing comes any more, but for what waits and then the last text.
     has_ended: bool,
+    last: Option<Text>,
 }
 
 impl Outbox {
@@ -277,7 +278,7 @@ impl Client {
             return Ok(Some(Message::Text(text)));
         }
         let ended = outbox.has_ended.then_some(Message::End);
-        Ok(outbox.frame().or(ended))
+        Ok(outbox.frame().or_else(|| outbox.last.take().map(Message::Text)).or(ended))
     }
 
     /// Takes note that the viewer has decoded so many frames in all; from then on it is sent new
@@ -287,6 +288,15 @@ impl Client {
         let done = lock(&self.outbox).acknowledge(frames);
         self.wake.notify_one();
         done
+    }
+
+    /// Tells something, unless the end was told.
+    fn tell(&self, change: impl FnOnce(&mut Outbox)) {
+        self.put(|outbox| {
+            if !outbox.has_ended {
+                change(outbox);
+            }
+        });
     }
 
     fn put(&self, change: impl FnOnce(&mut Outbox)) {
@@ -301,22 +311,22 @@ impl Client {
 
     /// Has a change of the stack told, with those that were not told yet.
     pub(super) fn stack(&self, change: StackChange) {
-        self.put(|outbox| outbox.stack = Some(change.after(outbox.stack)));
+        self.tell(|outbox| outbox.stack = Some(change.after(outbox.stack)));
     }
 
     /// Puts a status in the place of the last one.
     pub(super) fn status(&self, text: &Text) {
-        self.put(|outbox| outbox.status = Some(text.clone()));
+        self.tell(|outbox| outbox.status = Some(text.clone()));
     }
 
     /// Puts a camera in the place of the last one.
     pub(super) fn camera(&self, text: &Text) {
-        self.put(|outbox| outbox.camera = Some(text.clone()));
+        self.tell(|outbox| outbox.camera = Some(text.clone()));
     }
 
     /// Adds values of monitors; where very many are unread, the oldest make way.
     pub(super) fn monitor(&self, text: &Text) {
-        self.put(|outbox| {
+        self.tell(|outbox| {
             if outbox.monitors.len() >= MONITORS {
                 outbox.monitors.pop_front();
             }
@@ -357,14 +367,16 @@ impl Client {
         self.put(|outbox| outbox.closing = Some(closing));
     }
 
-    /// Ends the connection once all else was sent.
-    pub(super) fn end(&self) {
+    /// Ends the connection once all else was sent, and behind it the last text. What is told later
+    /// is not sent.
+    pub(super) fn end(&self, last: Option<&Text>) {
+        self.tell(|outbox| outbox.last = last.cloned());
         self.put(|outbox| outbox.has_ended = true);
     }
 
     /// Adds a text, which is never left out; a viewer that leaves very many unread is let go.
     pub(super) fn text(&self, text: &Text) {
-        self.put(|outbox| {
+        self.tell(|outbox| {
             if outbox.texts.len() >= TEXTS {
                 outbox.closing.get_or_insert((1008, "too much was left unread"));
             } else {
