@@ -65,8 +65,6 @@ struct CommandAgain {
     comes_late: bool,
     /// Whether it had taken effect.
     has_settled: bool,
-    /// Whether the journal has it before the checkpoint.
-    is_noted: bool,
 }
 
 /// A checkpoint, and what came after it.
@@ -202,7 +200,7 @@ impl Again {
         let of_checkpoint = of_checkpoint.map(|saved| {
             let SavedCommand { id, by, command } = saved;
             let outcome = Outcome::Open {};
-            let new = Taken { id, by: by.clone(), command: None, outcome, is_before: true };
+            let new = Taken { id, by: by.clone(), command: None, outcome };
             let (at, mut taken) = outcomes.remove(&new.id).unwrap_or((usize::MAX, new));
             if taken.command.is_none() {
                 (taken.by, taken.command) = (by, Some(command));
@@ -213,7 +211,7 @@ impl Again {
         let mut rest: Vec<_> = outcomes.into_values().collect();
         rest.sort_by_key(|(at, _)| *at);
         for (at, taken) in of_checkpoint.into_iter().chain(rest) {
-            let Taken { id, by, command, outcome, is_before } = taken;
+            let Taken { id, by, command, outcome } = taken;
             // One that neither the journal nor the checkpoint has was settled before that.
             let Some(command) = command else { continue };
             let is_lasting = matches!(
@@ -228,15 +226,7 @@ impl Again {
                 Outcome::Applied { cycle, comes_late } => (cycle, comes_late, true),
                 Outcome::Open {} => (open, true, false),
             };
-            let command = CommandAgain {
-                id,
-                by,
-                command,
-                cycle,
-                comes_late,
-                has_settled,
-                is_noted: is_before,
-            };
+            let command = CommandAgain { id, by, command, cycle, comes_late, has_settled };
             match () {
                 // What a pause or a stop was for went with the run that was killed.
                 () if !is_lasting => {}
@@ -341,11 +331,13 @@ impl Adaptor {
                 return;
             }
             let front = commands.pop_front();
-            let Some(CommandAgain { id, by, command, has_settled, is_noted, .. }) = front else {
+            let Some(CommandAgain { id, by, command, has_settled, .. }) = front else {
                 return;
             };
             let source = Source::Earlier(by, has_settled);
-            if self.communicator.rank() == 0 && !(is_noted && self.log.has_order(&id)) {
+            // A run that is carried out again has the lines up to the checkpoint and those of this run;
+            // a line that says the same twice does no harm.
+            if self.communicator.rank() == 0 {
                 self.log.accept_again(&id, &source, &command, moment);
             }
             self.obey(id, &source, command, None, moment);

@@ -39,8 +39,6 @@ pub struct Taken {
     pub command: Option<Command>,
     /// What became of it.
     pub outcome: Outcome,
-    /// Whether it was accepted before the checkpoint.
-    pub is_before: bool,
 }
 
 /// What became of a command.
@@ -259,8 +257,7 @@ impl Reader {
                 self.given_again.insert(id);
                 return Ok(());
             }
-            let is_before = !self.has_checkpoint;
-            let taken = self.taken(id, is_before)?;
+            let taken = self.taken(id)?;
             if taken.command.is_none() {
                 taken.by = by.unwrap_or(CommandAuthor::Program);
                 taken.command = Some(command);
@@ -280,7 +277,7 @@ impl Reader {
                 OrderStatus::Applied => Outcome::Applied { cycle, comes_late },
                 _ => Outcome::Rejected { cycle, reason: reason.unwrap_or_default() },
             };
-            let taken = self.taken(id.clone(), true)?;
+            let taken = self.taken(id.clone())?;
             if std::mem::replace(&mut taken.outcome, outcome) != (Outcome::Open {}) {
                 self.history.settled.retain(|(known, _)| *known != id);
             }
@@ -293,13 +290,13 @@ impl Reader {
     }
 
     /// The command of this name.
-    fn taken(&mut self, id: String, is_before: bool) -> Result<&mut Taken, Exceeded> {
+    fn taken(&mut self, id: String) -> Result<&mut Taken, Exceeded> {
         if !self.taken.contains_key(&id) {
             WAITING.check(self.taken.len() + 1)?;
             self.accepted.push(id.clone());
         }
         let (by, command, outcome) = (CommandAuthor::Program, None, Outcome::Open {});
-        let new = Taken { id: id.clone(), by, command, outcome, is_before };
+        let new = Taken { id: id.clone(), by, command, outcome };
         Ok(self.taken.entry(id).or_insert(new))
     }
 
