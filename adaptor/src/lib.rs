@@ -54,6 +54,7 @@ mod error;
 mod fingerprint;
 pub mod foreign;
 mod journal;
+mod link;
 mod lock;
 pub mod logging;
 mod meeting;

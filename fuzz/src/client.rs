@@ -9,7 +9,7 @@ use std::{
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::{Message, WebSocket};
 use tombolo::{
-    client::{Client, ClientError, Link, Options},
+    client::{Client, ClientError, Link, LinkError, Options},
     deform::{features::FeatureSettings, shapes::box_of_tets, surface::Surface},
     pipelines::{encode::encode_surface, language::RelayAddress, limits::EDITS},
 };
@@ -124,7 +124,7 @@ pub(crate) fn events(text: &str) -> Result<String, String> {
 fn connected(server: &Server, views: bool) -> Result<Result<Client, ClientError>, String> {
     let link: Link = format!("http://{}/?token=t", server.address())
         .parse()
-        .map_err(|error: ClientError| error.to_string())?;
+        .map_err(|error: LinkError| error.to_string())?;
     let options = Options { views, attempts: 0, ..Options::default() };
     Ok(Client::connect(&link, &options))
 }

@@ -22,10 +22,7 @@ use tombolo::{
     stream::relay::{Relay, RelaySettings},
 };
 
-use crate::{
-    seeds::Seeds,
-    server::{PATIENCE, Server, asks_for, head, patient, read_to_end, shake_hands},
-};
+use crate::server::{PATIENCE, Server, asks_for, head, patient, read_to_end, shake_hands};
 
 /// A secret as runs and relays show it.
 const SECRET: &str = "0123456789abcdef0123456789abcdef";
@@ -64,10 +61,10 @@ pub(crate) fn attach_seeds() -> Vec<Vec<u8>> {
 }
 
 /// A run's first words to a relay: it is taken in under a name, or told why not.
-pub(crate) fn attach(seeds: &Seeds, text: &str) -> Result<String, String> {
-    let mut relay = seeds.services.relay.lock().unwrap_or_else(PoisonError::into_inner);
+pub(crate) fn attach(services: &Services, folder: &Path, text: &str) -> Result<String, String> {
+    let mut relay = services.relay.lock().unwrap_or_else(PoisonError::into_inner);
     if relay.is_none() {
-        let directory = seeds.folder.path().join("relay");
+        let directory = folder.join("relay");
         let listen = SocketAddr::from(([127, 0, 0, 1], 0));
         let settings = RelaySettings { listen, ..RelaySettings::new(&directory) };
         let started = Relay::start(&settings).map_err(text_of)?;
@@ -136,7 +133,7 @@ enum Read {
 
 /// A run, which serves a recording, hears all that from a relay. It goes on to do what the relay asks, or
 /// ends the connection; its links can be read by clients, whatever name and address it was given.
-pub(crate) fn relayed(seeds: &Seeds, text: &str) -> Result<String, String> {
+pub(crate) fn relayed(folder: &Path, recording: &Path, text: &str) -> Result<String, String> {
     let at = text.match_indices("HTTP/").map(|(at, _)| at).next().unwrap_or(text.len());
     let (said, answer) = text.split_at(at);
     let mut said: Vec<String> = said.lines().take(SAID).map(str::to_owned).collect();
@@ -146,10 +143,10 @@ pub(crate) fn relayed(seeds: &Seeds, text: &str) -> Result<String, String> {
     let server = Server::start(move |stream| serve(stream, &said, &answer, &tell));
     let server = server.map_err(text_of)?;
     let settings = json!({"connect": format!("http://{}", server.address()),
-                          "secrets": secrets(seeds.folder.path()).map_err(text_of)?,
+                          "secrets": secrets(folder).map_err(text_of)?,
                           "name": "nozzle"});
     let settings: StreamServer = serde_json::from_value(settings).map_err(text_of)?;
-    let playback = Playback::start(seeds.recording_file(), &settings).map_err(text_of)?;
+    let playback = Playback::start(recording, &settings).map_err(text_of)?;
     match told.recv_timeout(PATIENCE) {
         Ok(Read::GivenUp) => Ok("given up".into()),
         Ok(Read::All) => {
@@ -222,12 +219,16 @@ pub(crate) fn playback_seeds() -> Vec<Vec<u8>> {
 
 /// A viewer says something to a recording: it is obeyed, or told what is wrong under the message's own
 /// id, and stays connected.
-pub(crate) fn playback(seeds: &Seeds, text: &str) -> Result<String, String> {
+pub(crate) fn playback(
+    services: &Services,
+    recording: &Path,
+    text: &str,
+) -> Result<String, String> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
-    let mut watching = seeds.services.watching.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut watching = services.watching.lock().unwrap_or_else(PoisonError::into_inner);
     let mut viewer = match watching.take() {
         Some(viewer) => viewer,
-        None => Watching::new(seeds)?,
+        None => Watching::new(recording)?,
     };
     // What comes back under this id comes behind every answer to the text.
     let id = format!("behind-{}", COUNT.fetch_add(1, Ordering::Relaxed));
@@ -244,10 +245,10 @@ pub(crate) fn playback(seeds: &Seeds, text: &str) -> Result<String, String> {
 }
 
 impl Watching {
-    fn new(seeds: &Seeds) -> Result<Self, String> {
+    fn new(recording: &Path) -> Result<Self, String> {
         let settings = json!({"listen": "127.0.0.1:0"});
         let settings: StreamServer = serde_json::from_value(settings).map_err(text_of)?;
-        let playback = Playback::start(seeds.recording_file(), &settings).map_err(text_of)?;
+        let playback = Playback::start(recording, &settings).map_err(text_of)?;
         let address = playback.address().ok_or("the recording is served nowhere")?;
         let link = playback.link();
         let token = link.split_once("token=").map_or("", |(_, token)| token);

@@ -163,9 +163,15 @@ impl Target {
             Self::Links => with_text(input, client::link),
             Self::Events => with_text(input, client::events),
             Self::Answers => client::answers(input),
-            Self::Playback => with_text(input, |text| relay::playback(seeds, text)),
-            Self::Attach => with_text(input, |text| relay::attach(seeds, text)),
-            Self::Relayed => with_text(input, |text| relay::relayed(seeds, text)),
+            Self::Playback => with_text(input, |text| {
+                relay::playback(&seeds.services, &seeds.recording_file(), text)
+            }),
+            Self::Attach => {
+                with_text(input, |text| relay::attach(&seeds.services, seeds.folder.path(), text))
+            }
+            Self::Relayed => with_text(input, |text| {
+                relay::relayed(seeds.folder.path(), &seeds.recording_file(), text)
+            }),
             Self::Msh | Self::Vtu | Self::Vtp | Self::Vtk => {
                 meshes::mesh(self.name(), seeds, input)
             }

@@ -1,19 +1,14 @@
 //! Why a run is not reached, or does not do what it was asked.
 
+use crate::link::LinkError;
+
 /// Why a run is not reached, or does not do what it was asked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ClientError {
     /// A text that is no link.
-    #[error(
-        "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, https:// or unix:/PATH?token=TOKEN, as the run has printed it"
-    )]
-    Link {
-        /// The text, without its token.
-        found: String,
-        /// A text that says what is wrong with it.
-        reason: String,
-    },
+    #[error(transparent)]
+    Link(#[from] LinkError),
     /// The host has no address.
     #[error("the host {host} has no address: {reason}")]
     Unknown {

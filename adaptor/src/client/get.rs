@@ -7,8 +7,9 @@ use tokio::{
     time::timeout,
 };
 
-use super::{ClientError, Link, link::Way};
+use super::{ClientError, Link};
 use crate::dial::{DialError, Stream, dial};
+use crate::link::Way;
 
 /// How long an answer may take as a whole. The first request for a surface has it encoded.
 const ANSWER: Duration = Duration::from_secs(120);

@@ -72,7 +72,6 @@ mod connection;
 mod error;
 mod event;
 mod get;
-mod link;
 mod state;
 
 use std::{
@@ -93,12 +92,12 @@ use tombolo_pipelines::{
     limits::{DOCUMENT, EDITS, ORDERS_BYTES},
 };
 
+pub use crate::link::{Link, LinkError};
 pub use error::ClientError;
 pub use event::{
     Complaint, Done, End, Event, Foretold, Hello, LinkTold, MonitorName, People, Person,
     PipelinesChanged, Precision, Received, Role, StackChange, Status, StatusQuality, Values, View,
 };
-pub use link::Link;
 use state::{Pending, Shared};
 
 /// Bytes of a reference surface.

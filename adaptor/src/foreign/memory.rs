@@ -4,7 +4,7 @@
 
 use crate::foreign::array::Array;
 use crate::foreign::error::RunError;
-use crate::foreign::mesh::Label;
+use crate::foreign::label::Label;
 
 /// Whether the bytes from `address` on can be read. Where the system will not say, they are taken
 /// to be.

@@ -8,6 +8,7 @@
 mod array;
 mod asked;
 mod error;
+mod label;
 mod memory;
 pub mod mesh;
 pub mod ranks;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tombolo_pipelines::language::{Change, Command, CommandAuthor};
 use tracing::{debug, info};
 
-use super::{log::Source, order_report::OrderStatus};
+use super::{order_report::OrderStatus, source::Source};
 use crate::{
     step::Moment,
     stream::{Clock, Hub},

@@ -15,42 +15,13 @@ use super::{
     order_report::{OrderReport, OrderStatus},
     planner::Rejection,
     room::is_urgent,
+    source::Source,
 };
 use crate::{journal::Journal, lock::lock, step::Moment, stream::Hub};
 
 /// The reason told for a command that a run which goes on from the checkpoint carries out.
 const LEFT_OPEN: &str = "the run ended before its turn came; a run that goes on from its \
                          checkpoint carries it out";
-
-/// Who gave a command.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Source {
-    /// The viewer of this number.
-    Viewer(u64),
-    /// A file of orders.
-    File,
-    /// The pipeline of this name.
-    Pipeline(String),
-    /// The file of the configuration, which has changed.
-    Configuration,
-    /// The program that the adaptor is linked into.
-    Program,
-    /// Somebody in the run that this one goes on from; whether that run had come to it.
-    Earlier(CommandAuthor, bool),
-}
-
-impl From<&Source> for CommandAuthor {
-    fn from(source: &Source) -> Self {
-        match source {
-            Source::Viewer(client) => CommandAuthor::Viewer(Hub::name(*client)),
-            Source::File => CommandAuthor::File,
-            Source::Pipeline(name) => CommandAuthor::Pipeline(name.clone()),
-            Source::Configuration => CommandAuthor::Configuration,
-            Source::Program => CommandAuthor::Program,
-            Source::Earlier(author, _) => author.clone(),
-        }
-    }
-}
 
 /// Shared by the thread that reads from viewers and the solver's.
 pub(crate) struct Log {

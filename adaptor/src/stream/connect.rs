@@ -35,8 +35,8 @@ use super::{
     tls::machine,
 };
 use crate::{
-    client::Link,
     dial::{Stream, connect, dial, encrypt},
+    link::Link,
     lock::lock,
 };
 

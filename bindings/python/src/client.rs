@@ -7,7 +7,7 @@ use std::time::Duration;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use tombolo::client::{self, Event, Link, Options};
+use tombolo::client::{self, Event, Link, LinkError, Options};
 use tombolo::deform::surface::Surface;
 use tombolo::pipelines::encode::DecodedFrame;
 use tombolo::pipelines::extract::{Association, Field};
@@ -128,7 +128,7 @@ impl Client {
         watches: bool,
         attempts: u32,
     ) -> PyResult<Self> {
-        let link: Link = link.parse().map_err(of_client)?;
+        let link: Link = link.parse().map_err(|error: LinkError| of_client(error.into()))?;
         let options = Options { views, watches, attempts, ..Options::default() };
         let connect = || client::Client::connect(&link, &options).map_err(of_client);
         let client = ManuallyDrop::new(guarded(|| py.detach(connect))?);

@@ -31,6 +31,7 @@ mod error;
 mod errors;
 mod extracts;
 mod file_pattern;
+mod file_series;
 mod glyphs;
 mod journal;
 mod journal_since;
@@ -74,7 +75,8 @@ pub use extracts::{
     Clip, ClipBy, ClipField, Contour, Cylinder, Plane, Quantifier, Slice, Threshold,
 };
 pub use file_pattern::file_pattern;
-pub(crate) use file_pattern::{picture_pattern, series_of};
+pub(crate) use file_pattern::picture_pattern;
+pub(crate) use file_series::series_of;
 pub use glyphs::{GlyphShape, Glyphs, GlyphsAt};
 pub use journal::{
     CheckpointNote, HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RestartedFrom,

@@ -4,10 +4,10 @@ use tombolo_deform::bounds::Bounds;
 
 use super::domain::Domain;
 use super::field::Field;
-use super::label::Label;
 use super::levels::{Grid, Mask};
 use crate::foreign::array::Fingerprint;
 use crate::foreign::error::RunError;
+use crate::foreign::label::Label;
 use crate::foreign::memory;
 
 /// One mesh of a channel.

@@ -2,10 +2,10 @@
 
 use super::coordset::Coordset;
 use super::field::{self, Field};
-use super::label::Label;
 use super::topology::Topology;
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
+use crate::foreign::label::Label;
 use crate::foreign::memory;
 
 /// Fields that say something of the mesh itself.

@@ -8,7 +8,6 @@ mod coordset;
 mod domain;
 mod field;
 mod kept;
-mod label;
 mod levels;
 mod polyhedron;
 mod rows;
@@ -19,7 +18,8 @@ pub use coordset::Coordset;
 pub use domain::{Domain, Faces, Lending, Roles};
 pub use field::{COMPONENTS, Field};
 pub(super) use kept::Kept;
-pub use label::Label;
 pub use levels::{Grid, Mask};
 pub use rows::Rows;
 pub use topology::Topology;
+
+pub use super::label::Label;

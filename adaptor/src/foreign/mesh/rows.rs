@@ -2,9 +2,9 @@
 
 use tombolo_deform::mesh::MeshError;
 
-use super::label::Label;
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
+use crate::foreign::label::Label;
 
 /// Rows of whole numbers.
 #[derive(Debug, Clone)]

@@ -2,11 +2,11 @@
 
 use tombolo_deform::mesh::{CellType, Cells, CellsView, Vector};
 
-use super::label::Label;
 use super::polyhedron::turn_outward;
 use super::rows::{Rows, vertex};
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
+use crate::foreign::label::Label;
 use crate::foreign::memory;
 
 /// Which cells a mesh has.

@@ -10,7 +10,7 @@ mod watch;
 
 use std::{io::Read, path::Path, time::Duration};
 
-use crate::client::{Client, ClientError, Event, Link, Options};
+use crate::client::{Client, ClientError, Event, Link, LinkError, Options};
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -135,22 +135,22 @@ pub(crate) fn failed(error: ClientError) -> Failure {
 /// The link itself, or the first one in a file.
 fn read_link(text: &str) -> Result<Link, ClientError> {
     if text.contains("://") || text.starts_with("unix:") || !Path::new(text).is_file() {
-        return text.parse();
+        return Ok(text.parse()?);
     }
     let mut bytes = Vec::new();
     let read = std::fs::File::open(text).and_then(|file| {
         file.take(LINK_FILE).read_to_end(&mut bytes)?;
         Ok(())
     });
-    let wrong = |reason: String| ClientError::Link { found: text.into(), reason };
+    let wrong = |reason: String| LinkError { found: text.into(), reason };
     read.map_err(|error| wrong(format!("the file cannot be read ({error})")))?;
     let content = String::from_utf8_lossy(&bytes);
     match content
         .split_whitespace()
         .find(|word| ["http://", "https://", "unix:"].iter().any(|begin| word.starts_with(begin)))
     {
-        Some(link) => link.parse(),
-        None => Err(wrong("the file holds none".into())),
+        Some(link) => Ok(link.parse()?),
+        None => Err(wrong("the file holds none".into()).into()),
     }
 }
 

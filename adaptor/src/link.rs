@@ -9,7 +9,17 @@ use std::{
 
 use tombolo_pipelines::language::is_fingerprint;
 
-use super::ClientError;
+/// A text that is no link.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, https:// or unix:/PATH?token=TOKEN, as the run has printed it"
+)]
+pub struct LinkError {
+    /// The text, without its token.
+    pub found: String,
+    /// A text that says what is wrong with it.
+    pub reason: String,
+}
 
 /// Bytes that a link may have.
 const LENGTH: usize = 4096;
@@ -30,7 +40,7 @@ const LENGTH: usize = 4096;
 /// assert_eq!(link.to_string(), "http://127.0.0.1:7070/runs/wing/?token=0123456789abcdef");
 /// let error = "127.0.0.1:7070".parse::<Link>().unwrap_err();
 /// assert!(error.to_string().contains("expected http://HOST:PORT/?token=TOKEN"));
-/// # Ok::<(), tombolo::client::ClientError>(())
+/// # Ok::<(), tombolo::client::LinkError>(())
 /// ```
 #[derive(Clone, PartialEq, Eq)]
 pub struct Link {
@@ -44,7 +54,7 @@ pub struct Link {
 
 /// How a connection is made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Way {
+pub(crate) enum Way {
     Plain,
     /// Encrypted, by the certificate of this fingerprint, or by one that this machine trusts.
     Encrypted(Option<String>),
@@ -53,7 +63,7 @@ pub(super) enum Way {
 }
 
 impl Link {
-    pub(super) fn way(&self) -> &Way {
+    pub(crate) fn way(&self) -> &Way {
         &self.way
     }
 
@@ -88,26 +98,26 @@ impl Link {
     }
 
     /// The host and port for a request's header.
-    pub(super) fn authority(&self) -> String {
+    pub(crate) fn authority(&self) -> String {
         format!("{}:{}", self.host, self.port)
     }
 
-    pub(super) fn token(&self) -> &str {
+    pub(crate) fn token(&self) -> &str {
         &self.token
     }
 
     /// The host as the system resolves it.
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         self.host.trim_start_matches('[').trim_end_matches(']')
     }
 
     /// The path of a request, with the token.
-    pub(super) fn path(&self, of: &str) -> String {
+    pub(crate) fn path(&self, of: &str) -> String {
         format!("{}/{of}?token={}", self.prefix, self.token)
     }
 
     /// The address of the viewer's page with a path behind it, such as `?key=...`.
-    pub(super) fn opened_by(&self, path: &str) -> String {
+    pub(crate) fn opened_by(&self, path: &str) -> String {
         let (scheme, usual) = match &self.way {
             Way::Plain => ("http", 80),
             Way::Encrypted(_) => ("https", 443),
@@ -118,7 +128,7 @@ impl Link {
     }
 
     /// The address of the WebSocket, for a client that had a name before, and what it comes back by.
-    pub(super) fn socket(&self, watches: bool, client: Option<&str>, back: Option<&str>) -> String {
+    pub(crate) fn socket(&self, watches: bool, client: Option<&str>, back: Option<&str>) -> String {
         let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
         if watches {
             client += "&role=watch";
@@ -131,14 +141,13 @@ impl Link {
 }
 
 impl FromStr for Link {
-    type Err = ClientError;
+    type Err = LinkError;
 
-    fn from_str(text: &str) -> Result<Self, ClientError> {
+    fn from_str(text: &str) -> Result<Self, LinkError> {
         let text = text.trim();
         // Whoever shows the error shows no token.
         let shown: String = text.split('?').next().unwrap_or_default().chars().take(100).collect();
-        let wrong =
-            |reason: &str| ClientError::Link { found: shown.clone(), reason: reason.into() };
+        let wrong = |reason: &str| LinkError { found: shown.clone(), reason: reason.into() };
         if text.len() > LENGTH {
             return Err(wrong("it is too long"));
         }
@@ -273,7 +282,7 @@ mod tests {
             "http://[::1]:80]/?token=a",
             &format!("http://host/{}/?token=a", "a".repeat(4074)),
         ] {
-            assert!(matches!(read(wrong), Err(ClientError::Link { .. })), "{wrong}");
+            assert!(read(wrong).is_err(), "{wrong}");
         }
         let error = read("http://host:x/?token=secret").expect_err("no port").to_string();
         assert!(!error.contains("secret"), "{error}");
