@@ -266,7 +266,7 @@ def test_a_mesh_of_two_coordinates_stays_in_its_plane():
     points, cells, faces = plate()
     orders = [{"at": {"cycle": 1}, "order": {"edits": edits}} for edits in (outside, inside)]
     with tombolo.Adaptor({"version": 1}, orders=orders) as adaptor:
-        for cycle in range(4):
+        for cycle in range(6):
             steering = adaptor.execute(cycle, 0.1 * cycle, 0.1, tombolo.Mesh(points, cells, faces=faces))
             if steering.motion is not None:
                 points[:] = steering.motion.coordinates
