@@ -120,7 +120,7 @@ pub struct Adaptor {
     is_replay: bool,
     meetings: Meetings,
     timing: Timing,
-    /// What is called while the solver waits.
+    /// The host's function that `execute` calls while it waits.
     look: Option<waiting::Look>,
     /// The channels whose vertices have two coordinates.
     in_plane: BTreeSet<String>,

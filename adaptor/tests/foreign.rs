@@ -13,14 +13,18 @@ use tombolo::{OrderReport, OrderStatus, Settings, Step};
 
 /// A mesh in the memory of a solver, by the addresses of its arrays.
 fn channel<'call>(points: &'call [[f64; 3]], cells: &'call [u32]) -> Channel<'call> {
+    // SAFETY: the numbers live as long as the array.
+    let connectivity =
+        unsafe { Array::new(cells.as_ptr().cast(), cells.len(), 4, NumberType::U32, false) };
+    channel_of(points, connectivity)
+}
+
+fn channel_of<'call>(points: &'call [[f64; 3]], connectivity: Array<'call>) -> Channel<'call> {
     let axis = |axis: usize| {
         let first = points.as_flattened()[axis..].as_ptr().cast();
         // SAFETY: one coordinate of each point, which live as long as the array.
         unsafe { Array::new(first, points.len(), 24, NumberType::F64, false) }
     };
-    // SAFETY: the numbers live as long as the array.
-    let connectivity =
-        unsafe { Array::new(cells.as_ptr().cast(), cells.len(), 4, NumberType::U32, false) };
     let label = Label::Words("channel 'solid'".into());
     let domain = Domain {
         coordset: Coordset::Explicit { axes: (0..3).map(axis).collect() },
@@ -152,5 +156,47 @@ fn another_mesh_is_taken_for_one_when_it_is_right() {
         assert_eq!(order.status, OrderStatus::Rejected);
         let reason = order.reason.as_deref().unwrap_or_default();
         assert!(reason.contains("the solver has made another mesh"), "{reason}");
+    }
+}
+
+/// Where nothing is looked at for some steps, and where everything is.
+#[test]
+fn cells_that_come_in_another_form_are_the_same_cells() {
+    for config in [
+        r#"{"version": 1}"#,
+        r#"{"version": 1, "pipelines": [{"name": "health", "stages": [{"quality": {}}]}]}"#,
+    ] {
+        let mut run = Run::new(Settings {
+            config: language::check(config, "configuration").expect("a configuration"),
+            orders: language::check_orders(ORDERS, "orders").expect("orders"),
+            ..Settings::default()
+        })
+        .expect("a run");
+        let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+        let mut points = mesh.points().to_vec();
+        let cells = mesh.cells().connectivity();
+        let apart: Vec<[i64; 2]> = cells.iter().map(|&vertex| [vertex.into(), -1]).collect();
+        let mut moved = 0;
+        for cycle in 0..10_u8 {
+            let step = Step { cycle: cycle.into(), time: 0.1 * f64::from(cycle), time_step: 0.1 };
+            let looked_at = run.looks_at(&step);
+            let channel = if cycle % 4 < 2 {
+                channel(&points, cells)
+            } else {
+                // SAFETY: the first of each pair of numbers, which live as long as the array.
+                let connectivity = unsafe {
+                    Array::new(apart.as_ptr().cast(), apart.len(), 16, NumberType::I64, false)
+                };
+                channel_of(&points, connectivity)
+            };
+            let shown = Shown { step, looked_at, channels: vec![channel] };
+            run.execute(Ok(shown)).unwrap_or_else(|error| panic!("cycle {cycle}: {error}"));
+            if let Some(motion) = &run.asked().motion {
+                points.clone_from_slice(&motion.coordinates);
+                moved += 1;
+            }
+        }
+        assert!(moved > 0);
+        assert_eq!(run.orders()[0].status, OrderStatus::Applied, "{:?}", run.orders());
     }
 }

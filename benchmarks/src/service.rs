@@ -217,6 +217,11 @@ pub fn now() -> f64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
+/// The median and the 95th percentile.
+fn spread(times: &Times) -> [(&'static str, f64); 2] {
+    [("median", times.median()), ("95th percentile", times.percentile(0.95))]
+}
+
 /// Measures all parts; some minutes, or one where it is only to be seen that it works.
 ///
 /// # Errors
@@ -268,13 +273,9 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
 
     let count = if short { 20 } else { 100 };
     let delays = run.delays(count)?;
-    push("order to first moved mesh, 60 840 cells", "median", delays.median(), "s");
-    push(
-        "order to first moved mesh, 60 840 cells",
-        "95th percentile",
-        delays.percentile(0.95),
-        "s",
-    );
+    for (what, value) in spread(&delays) {
+        push("order to first moved mesh, 60 840 cells", what, value, "s");
+    }
 
     let surface = Surface::extract(&run.mesh, &FeatureSettings::default())?;
     let vertices = surface.vertices().iter().copied().take(LISTED).collect();
@@ -312,13 +313,9 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
     let mut run = Run::new(LARGE)?;
     run.steps(|| true, alone)?;
     let delays = run.delays(count)?;
-    push("order to first moved mesh, 486 720 cells", "median", delays.median(), "s");
-    push(
-        "order to first moved mesh, 486 720 cells",
-        "95th percentile",
-        delays.percentile(0.95),
-        "s",
-    );
+    for (what, value) in spread(&delays) {
+        push("order to first moved mesh, 486 720 cells", what, value, "s");
+    }
     run.adaptor.finalize()?;
     Ok(Report { rows, targets })
 }

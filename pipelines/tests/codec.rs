@@ -43,6 +43,28 @@ fn check(points: &[[f64; 3]], triangles: &[[u32; 3]], lines: &[[u32; 2]], bound:
     coded
 }
 
+/// The message of a frame of a moving mesh, which a copy reads within the bound.
+fn motion_frame(
+    [motion, copy]: [&mut Motion; 2],
+    coded: &Coded,
+    points: &[[f64; 3]],
+    bound: f64,
+    frame: u32,
+) -> Vec<u8> {
+    let mut message = Vec::new();
+    motion.encode(&coded.topology, &coded.points, points, bound, &mut message).unwrap();
+    let mut rest = &message[..];
+    let read = copy.decode(&coded.topology, &mut rest).unwrap();
+    assert!(rest.is_empty() && read == motion.positions());
+    for (read, &point) in read.iter().zip(&coded.points) {
+        for axis in 0..3 {
+            let off = (read[axis] - points[point as usize][axis]).abs();
+            assert!(off <= bound, "frame {frame}: {off} of {bound}");
+        }
+    }
+    message
+}
+
 /// A grid of points in a bent plane, two triangles in each square.
 fn sheet(side: u32) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let points = (0..side * side)
@@ -209,17 +231,7 @@ fn a_mesh_that_moves_in_a_line_sends_it_once() {
     let mut sizes = Vec::new();
     for frame in 0..30 {
         let points: Vec<[f64; 3]> = still.iter().map(|&point| at(frame, point)).collect();
-        let mut message = Vec::new();
-        motion.encode(&coded.topology, &coded.points, &points, bound, &mut message).unwrap();
-        let mut rest = &message[..];
-        let read = copy.decode(&coded.topology, &mut rest).unwrap();
-        assert!(rest.is_empty() && read == motion.positions());
-        for (read, &point) in read.iter().zip(&coded.points) {
-            for axis in 0..3 {
-                let off = (read[axis] - points[point as usize][axis]).abs();
-                assert!(off <= bound, "frame {frame}: {off}");
-            }
-        }
+        let message = motion_frame([&mut motion, &mut copy], &coded, &points, bound, frame);
         sizes.push(message.len());
     }
     assert_eq!(sizes[..3], [1; 3]);
@@ -254,17 +266,7 @@ fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
             let near = if frame < 6 || offset > 0.0 { 1.0 } else { 0.0 };
             let points: Vec<[f64; 3]> =
                 still.iter().map(|point| point.map(|x| near * x + 0.1 * random())).collect();
-            let mut message = Vec::new();
-            motion.encode(&coded.topology, &coded.points, &points, bound, &mut message).unwrap();
-            let mut rest = &message[..];
-            let read = copy.decode(&coded.topology, &mut rest).unwrap();
-            assert!(rest.is_empty() && read == motion.positions());
-            for (read, &point) in read.iter().zip(&coded.points) {
-                for axis in 0..3 {
-                    let off = (read[axis] - points[point as usize][axis]).abs();
-                    assert!(off <= bound, "at {offset}, frame {frame}: {off}");
-                }
-            }
+            motion_frame([&mut motion, &mut copy], &coded, &points, bound, frame);
         }
     }
 }

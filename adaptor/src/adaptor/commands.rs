@@ -144,9 +144,8 @@ impl Adaptor {
     /// but for pauses and stops: they would change what is repeated.
     fn take_received(&mut self, moment: Moment) -> VecDeque<Received> {
         let Some(until) = self.resumed.repeats_until(moment.cycle) else {
-            self.resumed.puts_off = false;
             let mut received = self.queue.take();
-            if std::mem::take(&mut self.resumed.told) > 0 {
+            if std::mem::take(&mut self.resumed.put_off) > 0 {
                 received
                     .iter_mut()
                     .filter_map(|it| it.reservation.as_mut())
@@ -155,16 +154,15 @@ impl Adaptor {
             return received;
         };
         let pauses = self.queue.take_pauses();
-        let mut put_off = Vec::new();
-        self.queue.look(|received| put_off.push(received.id.clone()));
-        self.resumed.puts_off = !put_off.is_empty();
-        for id in put_off.split_off(self.resumed.told.min(put_off.len())) {
-            self.log.update(&id, |order| {
+        let mut waiting = Vec::new();
+        self.queue.look(|received| waiting.push(received.id.clone()));
+        for id in &waiting[self.resumed.put_off.min(waiting.len())..] {
+            self.log.update(id, |order| {
                 let what = "up to which the run repeats what it has done before";
                 order.waits_for = Some(format!("cycle {until}, {what}"));
             });
-            self.resumed.told += 1;
         }
+        self.resumed.put_off = waiting.len();
         pauses
     }
 

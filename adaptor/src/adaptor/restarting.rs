@@ -35,10 +35,8 @@ use crate::{
 pub(super) struct Resumed {
     mesh: Option<(SavedMesh, SavedPoints)>,
     again: Again,
-    /// Whether new commands wait until nothing is repeated any more.
-    pub(super) puts_off: bool,
-    /// How many of them know why.
-    pub(super) told: usize,
+    /// How many new commands wait until nothing is repeated any more, and are told so.
+    pub(super) put_off: usize,
 }
 
 /// The commands carried out again after a checkpoint, equal on all ranks.
@@ -119,7 +117,7 @@ impl Continued {
     /// What is left once a run has been set up.
     pub(super) fn into_resumed(self) -> Resumed {
         let Checkpoint { run, points, .. } = self.checkpoint;
-        Resumed { mesh: run.mesh.zip(points), again: self.again, puts_off: false, told: 0 }
+        Resumed { mesh: run.mesh.zip(points), again: self.again, put_off: 0 }
     }
 }
 
@@ -256,7 +254,7 @@ impl Resumed {
     /// Whether new commands were put off and nothing is repeated any more.
     #[inline]
     pub(super) fn has_put_off(&self, cycle: u64) -> bool {
-        self.puts_off && self.repeats_until(cycle).is_none()
+        self.put_off > 0 && self.repeats_until(cycle).is_none()
     }
 
     pub(super) fn is_over(&self) -> bool {

@@ -11,7 +11,7 @@ use crate::step::Moment;
 /// How long a paused run waits between two calls of `look`.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
-/// What is called while the solver waits.
+/// A function of the host that `execute` calls while it waits.
 pub(super) type Look = Box<dyn FnMut() + Send>;
 
 impl Adaptor {

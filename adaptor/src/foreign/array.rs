@@ -267,17 +267,14 @@ impl<'call> Array<'call> {
     /// Takes the values into a fingerprint, whatever their type and wherever each lies.
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
         into.add(self.count as u64);
-        let is_beside = self.is_compact() && !self.swapped;
-        match self.number {
-            NumberType::U32 if is_beside && let Some((values, _)) = self.slice::<u32>() => {
+        match self.indices() {
+            Some(Indices::U32(values)) => {
                 into.integers(values.len(), |index| i64::from(values[index]));
             }
-            NumberType::I32 if is_beside && let Some((values, _)) = self.slice::<i32>() => {
+            Some(Indices::I32(values)) => {
                 into.integers(values.len(), |index| i64::from(values[index]));
             }
-            NumberType::I64 if is_beside && let Some((values, _)) = self.slice::<i64>() => {
-                into.integers(values.len(), |index| values[index]);
-            }
+            Some(Indices::I64(values)) => into.integers(values.len(), |index| values[index]),
             _ => into.integers(self.count, |index| {
                 self.integer(index).unwrap_or(self.get(index).to_bits().cast_signed())
             }),
@@ -325,6 +322,50 @@ impl Fingerprint {
         (whole..count).for_each(|index| self.add(value(index).cast_unsigned()));
         if above > 0 {
             (0..whole).for_each(|index| self.add((value(index) >> 32).cast_unsigned()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fingerprint<T>(
+        values: &[T],
+        stride: usize,
+        number: NumberType,
+        swapped: bool,
+    ) -> Fingerprint {
+        let (count, bytes) = (values.len().div_ceil(stride), stride * number.bytes());
+        // SAFETY: every `stride`-th of the values, which live longer than this.
+        let array = unsafe { Array::new(values.as_ptr().cast(), count, bytes, number, swapped) };
+        let mut found = Fingerprint::default();
+        array.fingerprint(&mut found);
+        found
+    }
+
+    #[test]
+    fn numbers_are_the_same_in_every_type_and_layout() {
+        let numbers: Vec<i64> = (0..37).map(|number| number * number % 29).collect();
+        let expected = fingerprint(&numbers, 1, NumberType::I64, false);
+        let small: Vec<i32> = numbers.iter().map(|&number| number as i32).collect();
+        let real: Vec<f64> = numbers.iter().map(|&number| number as f64).collect();
+        let swapped: Vec<i64> = numbers.iter().map(|number| number.to_be()).collect();
+        let apart: Vec<i64> = numbers.iter().flat_map(|&number| [number, 7]).collect();
+        for found in [
+            fingerprint(&small, 1, NumberType::I32, false),
+            fingerprint(&small, 1, NumberType::U32, false),
+            fingerprint(&numbers, 1, NumberType::U64, false),
+            fingerprint(&real, 1, NumberType::F64, false),
+            fingerprint(&swapped, 1, NumberType::I64, true),
+            fingerprint(&apart, 2, NumberType::I64, false),
+        ] {
+            assert_eq!(found, expected);
+        }
+        for (index, by) in [(0, 1), (36, 1), (3, 1 << 32), (36, 1 << 40), (8, -100)] {
+            let mut others = numbers.clone();
+            others[index] += by;
+            assert_ne!(fingerprint(&others, 1, NumberType::I64, false), expected, "{index}, {by}");
         }
     }
 }

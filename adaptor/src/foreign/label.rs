@@ -1,10 +1,10 @@
-//! What errors call a channel, its meshes and their parts.
+//! The labels of a channel, its meshes and their parts in errors.
 
 use std::fmt;
 
 use crate::foreign::error::RunError;
 
-/// What errors call a thing that a solver shows, in the terms in which it was shown.
+/// The label that errors have for a thing that a solver shows, in the terms in which it was shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Label {
     /// The path of a node, below which its parts lie.

@@ -124,10 +124,9 @@ impl Queue {
     pub(crate) fn take_pauses(&self) -> VecDeque<Received> {
         let mut waiting = lock(&self.waiting);
         self.attention.store(false, Ordering::Release);
-        let is_pause = |received: &Received| {
-            matches!(received.command, Command::Pause {} | Command::Resume {} | Command::Stop {})
-        };
-        let (pauses, rest) = std::mem::take(&mut *waiting).into_iter().partition(is_pause);
+        let (pauses, rest) = std::mem::take(&mut *waiting)
+            .into_iter()
+            .partition(|received| received.command.is_of_job());
         *waiting = rest;
         pauses
     }

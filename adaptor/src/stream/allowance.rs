@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 /// Messages that may be sent at once.
-pub(super) const BURST: f64 = 40.0;
+const BURST: f64 = 40.0;
 /// Messages a second that may be sent in the long run.
-pub(super) const RATE: f64 = 20.0;
+const RATE: f64 = 20.0;
 /// Bytes of a message that count as one more.
 pub(super) const WEIGHT: usize = 1 << 20;
 

@@ -165,21 +165,20 @@ async fn read(
 ) {
     let client = seat.client;
     while let Some(Ok(message)) = stream.next().await {
-        match &message {
+        let message = match message {
             Wire::Close(_) => return,
             Wire::Ping(_) | Wire::Pong(_) => continue,
             // Not counted: there is no more of it than there are frames.
-            Wire::Binary(bytes) if acknowledged(bytes, client) => continue,
-            Wire::Text(_) | Wire::Binary(_) => {}
-        }
+            Wire::Binary(bytes) if acknowledged(&bytes, client) => continue,
+            message => message,
+        };
         // Waiting here leaves the rest in the viewer's own socket.
         while !lock(&holder.allowance).take(bytes(&message)) {
             tokio::time::sleep(HELD_BACK).await;
         }
         let answer = match message {
-            Wire::Close(_) | Wire::Ping(_) | Wire::Pong(_) => continue,
             Wire::Text(text) => receive(&text, seat, credentials),
-            Wire::Binary(_) => Err((
+            _ => Err((
                 None,
                 "a binary message that is not the number of frames decoded, 8 bytes, more than \
                  before and no more than were sent; commands are JSON text"

@@ -249,11 +249,6 @@ impl Known {
         }
         self.timed
     }
-
-    /// Whether it was for the job that it was given in, and not for one that goes on from there.
-    fn is_of_job(&self) -> bool {
-        matches!(self.timed.command, Command::Pause {} | Command::Resume {} | Command::Stop {})
-    }
 }
 
 /// The lines of the newest run.
@@ -307,7 +302,8 @@ fn read_lines(text: &str, file: &str) -> Result<KnownLines, LanguageError> {
                     newest.add(&Document::read(content, file).map_err(at_line(number))?, number)?;
                     newest.lines.push((number, content));
                 }
-                let of_job = newest.known.commands.iter_mut().filter(|known| known.is_of_job());
+                let of_job = newest.known.commands.iter_mut();
+                let of_job = of_job.filter(|known| known.timed.command.is_of_job());
                 of_job.for_each(|known| known.is_carried_out = false);
             }
         }

@@ -168,6 +168,13 @@ pub struct Cancel {
 }
 
 impl Command {
+    /// Whether it is for the job that it is given in, and not for a run that goes on from there: a
+    /// pause, what ends one, or a stop.
+    #[must_use]
+    pub fn is_of_job(&self) -> bool {
+        matches!(self, Command::Pause {} | Command::Resume {} | Command::Stop {})
+    }
+
     /// The key by which JSON knows the command.
     #[must_use]
     pub fn name(&self) -> &'static str {

@@ -34,7 +34,7 @@ impl Block<'_> {
 pub struct Channel<'call> {
     /// Its name.
     pub name: String,
-    /// What errors call it.
+    /// The channel's label in errors.
     pub label: Label,
     /// Its meshes; none on a rank without data.
     pub blocks: Vec<Block<'call>>,
@@ -97,7 +97,7 @@ impl<'call> Channel<'call> {
             })
     }
 
-    /// What is said of the mesh itself and passed over, for the log.
+    /// Notes for the log on parts of the mesh that are passed over.
     pub(in crate::foreign) fn passed_over(&self) -> Vec<String> {
         let any =
             |is_so: fn(&Domain<'_>) -> bool| self.blocks.iter().any(|block| is_so(&block.domain));

@@ -56,7 +56,7 @@ pub struct Domain<'call> {
     pub faces: Vec<Faces<'call>>,
     /// Fields that say something of the mesh itself.
     pub roles: Roles<'call>,
-    /// What errors call it.
+    /// The domain's label in errors.
     pub label: Label,
 }
 

@@ -111,7 +111,7 @@ impl<'call> Rows<'call> {
         Ok(())
     }
 
-    /// What errors call one of the arrays.
+    /// The label in errors of one of the arrays.
     fn part(&self, name: &str) -> Label {
         self.label.part(name, name)
     }

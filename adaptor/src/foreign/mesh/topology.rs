@@ -25,7 +25,7 @@ pub enum Topology<'call> {
         cell_type: CellType,
         /// The vertices, cell after cell.
         connectivity: Array<'call>,
-        /// What errors call the connectivity.
+        /// The connectivity's label in errors.
         label: Label,
     },
     /// Those of one type after those of another: topologies of uniform cells.
@@ -49,7 +49,7 @@ pub enum Topology<'call> {
         map: Vec<(i64, CellType)>,
         /// The vertices of each face of polyhedra.
         faces: Option<Rows<'call>>,
-        /// What errors call the types' numbers.
+        /// The label in errors of the numbers of the types.
         label: Label,
         /// The numbers that are expected, in the solver's terms.
         expected: &'static str,
