@@ -148,12 +148,9 @@ impl Changes {
             command: command.clone(),
             reservation: Some(reservation),
         };
-        self.log.accept_from(client, id, &command, self.clock.get(), move |is_taken| {
-            if is_taken {
-                changes.queue.push(received);
-            } else {
-                lock(&changes.state).under_way.retain(|(waiting, _)| *waiting != received.id);
-            }
+        self.log.accept_from(client, id, &command, self.clock.get(), move |taken| match taken {
+            Some(tell) => changes.queue.push_and_tell(received, tell),
+            None => lock(&changes.state).under_way.retain(|(waiting, _)| *waiting != received.id),
         });
         Ok(())
     }

@@ -65,6 +65,25 @@ fn an_order_is_cancelled_while_its_shapes_are_found() {
     solver.finish();
 }
 
+/// An order waits for the disk; what cancels it does not overtake it there.
+#[test]
+fn an_order_is_cancelled_in_the_moment_after_it_is_given() {
+    let output = tempfile::tempdir().unwrap();
+    let config = config(&LINK_TO_ALL.replacen('{', r#"{"journal": "journal.jsonl", "#, 1));
+    let settings = Settings { config, output: output.path().into(), ..Settings::default() };
+    let mut solver = Solver::of_box([24, 24, 24], settings);
+    let mut viewer = driven(&mut solver);
+    for index in 0..5 {
+        let (order, cancel) = (format!("order-{index}"), format!("cancel-{index}"));
+        viewer.send(&json!({"id": order, "order": long(0.3)}));
+        viewer.send(&json!({"id": cancel, "cancel": {"order": order}}));
+        let rejected = solver.step_until_told(&mut viewer, "order", has_status(&order, "rejected"));
+        assert_eq!(rejected["reason"], "cancelled by c1");
+        solver.step_until_told(&mut viewer, "done", |done| done["id"] == *cancel);
+    }
+    assert!(solver.motions.is_empty(), "{:?}", solver.motions);
+}
+
 #[test]
 fn an_order_that_moves_the_mesh_is_not_cancelled() {
     let mut solver = Solver::with_config(LINK_TO_ALL);

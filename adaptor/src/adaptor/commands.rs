@@ -451,10 +451,10 @@ impl CommandSink for Intake {
             reservation: Some(reservation),
         };
         let (queue, forecaster) = (Arc::clone(&self.queue), Arc::clone(&self.forecaster));
-        self.log.accept_from(client, id, &command, moment, move |is_taken| {
-            if is_taken {
+        self.log.accept_from(client, id, &command, moment, move |taken| {
+            if let Some(tell) = taken {
                 let stops = matches!(received.command, Command::Stop {});
-                queue.push(received);
+                queue.push_and_tell(received, tell);
                 if stops {
                     forecaster.get().into_iter().for_each(Forecaster::give_up);
                 }

@@ -115,6 +115,11 @@ impl KnownCommands {
         self.expected.remove(id);
     }
 
+    /// Whether the name was given to a command and no order of that name is kept.
+    pub(super) fn is_only_named(&self, id: &str) -> bool {
+        self.names.contains_key(id) && self.order(id).is_none()
+    }
+
     /// Lets go of the name of a command that was not taken.
     pub(super) fn forget(&mut self, id: &str) {
         self.names.remove(id);

@@ -84,7 +84,8 @@ impl Log {
         let is_known = lock(&self.state).reserve(id, digest);
         self.journal.write(&accepted(id, source, command, moment));
         if !is_known {
-            self.admit(id, source, command, moment);
+            self.events.accepted(id, source, command, moment);
+            self.admit(id, command, moment);
         }
     }
 
@@ -109,7 +110,8 @@ impl Log {
         };
         let (Named::New(id) | Named::Again(id)) = named;
         self.journal.write(&accepted(&id, source, command, moment));
-        self.admit(&id, source, command, moment);
+        self.events.accepted(&id, source, command, moment);
+        self.admit(&id, command, moment);
         Ok(id)
     }
 
@@ -145,33 +147,34 @@ impl Log {
     }
 
     /// Takes a command of a viewer in, under the name that it was given. `then` is called once it is
-    /// on disk, on another thread, and hears that it is taken; or that it is not, because the
-    /// journal cannot be written, which the viewer is told. What a run must hear in any case
-    /// (pause, resume, stop, cancel) does not wait for the disk.
+    /// on disk, on another thread, with what tells viewers that it is taken: to be called when it is
+    /// where the solver finds it. It is called with `None` where the journal cannot be written, which
+    /// the viewer is told. What a run must hear in any case (pause, resume, stop, cancel) does not
+    /// wait for the disk, unless it cancels an order that does.
     pub(crate) fn accept_from(
         self: &Arc<Self>,
         client: u64,
         id: String,
         command: &Command,
         moment: Moment,
-        then: impl FnOnce(bool) + Send + 'static,
+        then: impl FnOnce(Option<&dyn Fn()>) + Send + 'static,
     ) {
         let source = Source::Viewer(client);
         let entry = accepted(&id, &source, command, moment);
-        if is_urgent(command) {
+        if is_urgent(command) && !self.cancels_unwritten(command) {
             self.journal.write(&entry);
-            self.admit(&id, &source, command, moment);
-            return then(true);
+            self.events.accepted(&id, &source, command, moment);
+            return then(Some(&|| self.admit(&id, command, moment)));
         }
         let (log, command) = (Arc::clone(self), command.clone());
         self.journal.ask(&entry, move |outcome| match outcome {
             Ok(()) => {
-                log.admit(&id, &source, &command, moment);
-                then(true);
+                log.events.accepted(&id, &source, &command, moment);
+                then(Some(&|| log.admit(&id, &command, moment)));
             }
             Err(reason) => {
                 lock(&log.state).forget(&id);
-                then(false);
+                then(None);
                 if let Some(hub) = &log.hub {
                     let message = format!(
                         "it was not taken, because the journal cannot be written: {reason}; try again once it can"
@@ -185,9 +188,13 @@ impl Log {
         });
     }
 
+    /// Whether a command cancels an order that is named and not in the journal yet.
+    fn cancels_unwritten(&self, command: &Command) -> bool {
+        matches!(command, Command::Cancel(cancel) if lock(&self.state).is_only_named(&cancel.order))
+    }
+
     /// Notes and tells a command that is in the journal.
-    fn admit(&self, id: &str, source: &Source, command: &Command, moment: Moment) {
-        self.events.accepted(id, source, command, moment);
+    fn admit(&self, id: &str, command: &Command, moment: Moment) {
         match command {
             Command::Order(order) => {
                 lock(&self.state).add(id, order, moment.cycle);

@@ -64,7 +64,16 @@ impl Queue {
     }
 
     pub(crate) fn push(&self, received: Received) {
-        lock(&self.waiting).push_back(received);
+        self.push_and_tell(received, || {});
+    }
+
+    /// Puts a command into the queue and calls `tell` before the solver's thread can take it from
+    /// there: who hears of a command finds it in the queue, and hears nothing else of it before.
+    pub(crate) fn push_and_tell(&self, received: Received, tell: impl FnOnce()) {
+        let mut waiting = lock(&self.waiting);
+        waiting.push_back(received);
+        tell();
+        drop(waiting);
         self.call();
     }
 
