@@ -188,17 +188,15 @@ impl Writing {
     }
 
     fn put(&mut self, kind: Kind, view: u32, message: &[u8]) -> Result<(), String> {
-        let Moment { cycle, time } = self.hub.clock.get();
-        let written = self.out.put(kind, view, (cycle, time), message);
-        let bytes = written.map_err(|error| error.to_string())?;
-        if bytes > self.most_bytes {
+        if self.out.bytes + (HEAD + message.len()) as u64 > self.most_bytes {
             self.out.flush().map_err(|error| error.to_string())?;
             return Err(format!(
                 "it has come to {} MB, the most that `record_megabytes` lets it have",
                 self.most_bytes >> 20
             ));
         }
-        Ok(())
+        let Moment { cycle, time } = self.hub.clock.get();
+        self.out.put(kind, view, (cycle, time), message).map_err(|error| error.to_string())
     }
 }
 
@@ -250,19 +248,13 @@ impl Out {
         Ok(Self { file, bytes: end, begun: Instant::now(), before })
     }
 
-    fn put(
-        &mut self,
-        kind: Kind,
-        view: u32,
-        moment: (u64, f64),
-        message: &[u8],
-    ) -> io::Result<u64> {
+    fn put(&mut self, kind: Kind, view: u32, moment: (u64, f64), message: &[u8]) -> io::Result<()> {
         let passed = u64::try_from(self.begun.elapsed().as_millis()).unwrap_or(u64::MAX);
         let milliseconds = self.before.saturating_add(passed);
         if let Some(head) = Head::of(kind, view, moment, milliseconds, message) {
             self.bytes += write(&mut self.file, &head, message)?;
         }
-        Ok(self.bytes)
+        Ok(())
     }
 
     fn flush(&mut self) -> io::Result<()> {

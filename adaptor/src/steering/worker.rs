@@ -120,6 +120,16 @@ impl Jobs {
         }
     }
 
+    /// Lets a plan go on that another thread makes while this one has no plan under way: what was
+    /// cancelled before it is over.
+    fn renew(&self) {
+        let mut state = lock(&self.state);
+        state.at_plan = None;
+        if !state.gives_up {
+            self.cancellation.renew();
+        }
+    }
+
     /// Gives up whatever is under way, and what will be asked for from now on.
     pub(crate) fn give_up(&self) {
         self.change(|state| {
@@ -208,6 +218,17 @@ impl Worker {
     /// Gives up the plan of this number, whose answer counts no more.
     pub(crate) fn cancel(&self, number: u64) {
         self.jobs.cancel(number);
+    }
+
+    /// Makes a plan at once, on this thread, after what the worker is at.
+    pub(crate) fn plan_here(
+        &self,
+        planner: &Mutex<Planner>,
+        asked: &PlanRequest,
+    ) -> Result<Plan, Rejection> {
+        let mut planner = lock(planner);
+        self.jobs.renew();
+        planner.plan(asked)
     }
 
     /// The next finished job, if there is one.

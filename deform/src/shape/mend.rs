@@ -247,7 +247,10 @@ impl Shaper {
             lower -= 1;
         };
         for index in lower..stack.len() {
-            target = self.followed(&stack[..=index], target, deform, guard)?;
+            let followed = self.followed(&stack[..=index], target, deform, guard);
+            // What was found, or not found, while it was given up is not what there is.
+            self.body.require_wanted()?;
+            target = followed?;
             if self.mended.len() >= KEPT {
                 self.mended.remove(0);
             }
@@ -326,7 +329,7 @@ impl Shaper {
                     guard,
                     Some(&untangler),
                 );
-                if further(&second) > further(&route) {
+                if is_cancelled(&second) || further(&second) > further(&route) {
                     route = second;
                 }
             }
@@ -413,6 +416,14 @@ fn further<E>(route: &Result<Route, FollowError<E>>) -> f64 {
         Ok(_) => 1.0,
         Err(FollowError::Stalled(stalled)) => stalled.fraction(),
         Err(_) => -1.0,
+    }
+}
+
+fn is_cancelled(route: &Result<Route, FollowError<Refused>>) -> bool {
+    match route {
+        Err(FollowError::Boundary(error)) => error.is_cancelled(),
+        Err(FollowError::Volume(error)) => error.is_cancelled(),
+        Ok(_) | Err(FollowError::Stalled(_)) => false,
     }
 }
 

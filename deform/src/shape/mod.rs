@@ -27,7 +27,7 @@ use crate::linear::{BuiltIn, Cancellable, Solvers};
 use crate::mesh::{Domain, Mesh, Vector};
 use crate::quality::{Guard, SurfaceRule};
 use crate::surface::{Surface, require_sound};
-use crate::volume::{Improver, Untangler};
+use crate::volume::{Deform, Improver, Untangler};
 use body::Body;
 use carry::Carrier;
 pub use deformation::Deformation;
@@ -328,7 +328,10 @@ impl Shaper {
     }
 
     fn operator(&mut self, deform: &Deformation) -> Result<Arc<Carrier>, Refused> {
-        if let Some(found) = self.operators.iter().position(|(settings, _)| settings == deform) {
+        // How often a shape is improved is no matter of its operator.
+        let equation = Deform { improve: 0, ..deform.equation };
+        let wanted = Deformation { equation, ..deform.clone() };
+        if let Some(found) = self.operators.iter().position(|(settings, _)| *settings == wanted) {
             // The newest last, so that the oldest is the first to go.
             let entry = self.operators.remove(found);
             let operator = Arc::clone(&entry.1);
@@ -338,8 +341,8 @@ impl Shaper {
         if self.operators.len() >= OPERATORS {
             self.operators.remove(0);
         }
-        let operator = Arc::new(Carrier::new(&self.body, deform)?);
-        self.operators.push((deform.clone(), Arc::clone(&operator)));
+        let operator = Arc::new(Carrier::new(&self.body, &wanted)?);
+        self.operators.push((wanted, Arc::clone(&operator)));
         Ok(operator)
     }
 

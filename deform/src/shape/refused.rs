@@ -7,7 +7,6 @@ use crate::{
     edit::EditError,
     features::UnknownFeature,
     limits::Exceeded,
-    linear::LinearError,
     mesh::Vector,
     quality::Refusal,
     surface::BrokenSurface,
@@ -122,13 +121,13 @@ impl Refused {
     /// Whether it was given up, of which nothing follows for the next such request.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
-        matches!(
-            self,
+        match self {
             Refused::Cancelled
-                | Refused::Guard(Refusal::Cancelled)
-                | Refused::Edit(EditError::Cancelled)
-                | Refused::Volume(VolumeError::Linear(LinearError::Cancelled))
-        )
+            | Refused::Guard(Refusal::Cancelled)
+            | Refused::Edit(EditError::Cancelled) => true,
+            Refused::Volume(error) => error.is_cancelled(),
+            _ => false,
+        }
     }
 
     /// Whether it is the surface that is broken.

@@ -366,6 +366,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
             };
             match made {
                 Ok(made) => return Ok(Some(Arc::new(made.with_tolerance(settings.tolerance)))),
+                Err(error) if error.is_cancelled() => return Err(FollowError::Volume(error)),
                 Err(VolumeError::Linear(_)) => {}
                 // A mesh that the guard lets through and the material does not is one that no solve
                 // can follow.
@@ -389,6 +390,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         let Some(operator) = operator else { return Ok(None) };
         match moved(operator, shape, positions, guess, &mut self.route.iterations) {
             Ok(found) => Ok(Some(found)),
+            Err(error) if error.is_cancelled() => Err(FollowError::Volume(error)),
             Err(VolumeError::Linear(_)) => Ok(None),
             Err(error) => Err(FollowError::Volume(error)),
         }

@@ -44,6 +44,12 @@ use crate::number::Number;
 use crate::vector::Position;
 
 impl VolumeError {
+    /// Whether it was given up, of which nothing follows for the next solve.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Linear(crate::linear::LinearError::Cancelled))
+    }
+
     /// Whether the reason lies with another rank, which has an error of its own.
     #[must_use]
     pub fn is_of_other_rank(&self) -> bool {

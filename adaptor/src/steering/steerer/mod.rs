@@ -445,9 +445,12 @@ impl Steerer {
                 computing.number = worker.plan(computing.asked.clone());
                 self.computing = Some(computing);
             }
-            _ => {
+            worker => {
                 let begun = Instant::now();
-                let plan = lock(&self.planner).plan(&computing.asked);
+                let plan = match worker {
+                    Some(worker) => worker.plan_here(&self.planner, &computing.asked),
+                    None => lock(&self.planner).plan(&computing.asked),
+                };
                 self.commit(computing, plan, moment, begun, step_seconds);
             }
         }
@@ -550,9 +553,52 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
+    use tombolo_pipelines::language::Command;
 
     use super::*;
-    use crate::{journal::Journal, steering::Events};
+    use crate::{
+        journal::Journal,
+        steering::{Events, OrderReport, Source},
+    };
+
+    /// What is cancelled while its plan is made ends nothing that comes after it.
+    #[test]
+    fn an_order_is_planned_in_the_moment_in_which_another_is_cancelled() {
+        let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
+        let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+        let shaper = Shaper::new(&mesh, surface).unwrap();
+        let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
+        let mut steerer =
+            Steerer::new(shaper, Defaults::default(), Arc::clone(&log), Arc::default(), false)
+                .unwrap();
+        steerer.make_ready();
+        let order = |by: f64, steps: u32| -> Order {
+            serde_json::from_value(serde_json::json!({
+                "edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, by]}}],
+                "schedule": {"steps": steps}
+            }))
+            .unwrap()
+        };
+        let moment = Moment::default();
+        for round in 0..30 {
+            let by = -0.2 - 0.001 * f64::from(round);
+            for (name, order, background) in
+                [("long", order(by, 9000), true), ("now", order(-0.01, 1), false)]
+            {
+                let id = format!("{name} {round}");
+                let command = Command::Order(order.clone());
+                log.accept(Some(id.clone()), &Source::Program, &command, moment).unwrap();
+                steerer.take(id.clone(), order, background, None, None);
+                steerer.advance(moment, None);
+                if background {
+                    std::thread::sleep(Duration::from_millis(20));
+                    assert_eq!(steerer.withdraw(&id), Some(Ok(0)), "{id}");
+                }
+            }
+        }
+        let refused = |report: &OrderReport| report.status == OrderStatus::Rejected;
+        assert_eq!(log.reports().into_iter().find(refused), None);
+    }
 
     /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
     #[test]
