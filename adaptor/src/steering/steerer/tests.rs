@@ -1,0 +1,72 @@
+use std::sync::mpsc::channel;
+
+use tombolo_deform::{features::FeatureSettings, shapes::box_of_tets};
+use tombolo_pipelines::language::Command;
+
+use super::*;
+use crate::{
+    journal::Journal,
+    steering::{Events, OrderReport, Source},
+};
+
+/// What is cancelled while its plan is made ends nothing that comes after it.
+#[test]
+fn an_order_is_planned_in_the_moment_in_which_another_is_cancelled() {
+    let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    let shaper = Shaper::new(&mesh, surface).unwrap();
+    let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
+    let mut steerer =
+        Steerer::new(shaper, Defaults::default(), Arc::clone(&log), Arc::default(), false).unwrap();
+    steerer.make_ready();
+    let order = |by: f64, steps: u32| -> Order {
+        serde_json::from_value(serde_json::json!({
+            "edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, by]}}],
+            "schedule": {"steps": steps}
+        }))
+        .unwrap()
+    };
+    let moment = Moment::default();
+    for round in 0..30 {
+        let by = -0.2 - 0.001 * f64::from(round);
+        for (name, order, background) in
+            [("long", order(by, 9000), true), ("now", order(-0.01, 1), false)]
+        {
+            let id = format!("{name} {round}");
+            let command = Command::Order(order.clone());
+            log.accept(Some(id.clone()), &Source::Program, &command, moment).unwrap();
+            steerer.take(id.clone(), order, background, None, None);
+            steerer.advance(moment, None);
+            if background {
+                std::thread::sleep(Duration::from_millis(20));
+                assert_eq!(steerer.withdraw(&id), Some(Ok(0)), "{id}");
+            }
+        }
+    }
+    let refused = |report: &OrderReport| report.status == OrderStatus::Rejected;
+    assert_eq!(log.reports().into_iter().find(refused), None);
+}
+
+/// The operator of a large mesh takes seconds to set up, and the first step asks for these.
+#[test]
+fn what_stays_the_same_is_told_while_the_planner_is_at_work() {
+    let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
+    let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
+    let steerer = Steerer::new(shaper, Defaults::default(), log, Arc::default(), false).unwrap();
+    let planner = Arc::clone(&steerer.planner);
+    let (begins, begun) = channel();
+    let (ends, ended) = channel::<()>();
+    let at_work = std::thread::spawn(move || {
+        let _planner = lock(&planner);
+        begins.send(()).unwrap();
+        let _ = ended.recv_timeout(Duration::from_secs(10));
+    });
+    begun.recv().unwrap();
+    assert!(steerer.surface().is_some_and(|told| Arc::ptr_eq(&told, &surface)));
+    assert_eq!(steerer.mesh(), mesh);
+    assert!(steerer.planner.try_lock().is_err(), "it was waited for");
+    drop(ends);
+    at_work.join().unwrap();
+}
