@@ -22,7 +22,8 @@
 //!   du/dn = 0`); backflow is damped (Bazilevs et al. 2009).
 //! - A wall that starts or stops within one step acts by an impulse: the velocity is projected onto
 //!   the new boundary values before the step (Gresho and Sani 1998, on impulsive starts). The
-//!   impulse is no part of the reported pressure.
+//!   impulse is no part of the reported pressure, but for what its projections leave to that of the
+//!   step.
 //!
 //! # What is guaranteed, and what is not
 //!

@@ -13,6 +13,7 @@ use tombolo::Stopper;
 use tombolo::communicator::{Communicator, Solo};
 use tombolo::deform::linear::{BuiltIn, Solvers};
 use tombolo::pipelines::language::Listen;
+use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
 
@@ -76,6 +77,9 @@ struct Arguments {
     /// Do not tell the adaptor which vertices of the ranks are the same (to test)
     #[arg(long, hide_short_help = true)]
     without_numbers: bool,
+    /// How well the projections of an impulse are solved (to test that ranks solve the same)
+    #[arg(long, value_name = "RELATIVE", hide_short_help = true)]
+    impulse_tolerance: Option<f64>,
 }
 
 fn main() -> ExitCode {
@@ -189,6 +193,12 @@ fn run(
             empty_rank: arguments.empty_rank,
             shuffle: arguments.shuffle,
             without_numbers: arguments.without_numbers,
+        },
+        solves: Settings {
+            impulse_tolerance: arguments
+                .impulse_tolerance
+                .unwrap_or(Settings::default().impulse_tolerance),
+            ..Settings::default()
         },
     };
     if let Some(file) = arguments.report.as_ref().filter(|_| is_first) {

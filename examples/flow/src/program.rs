@@ -58,6 +58,8 @@ pub struct Options {
     pub restart: Option<PathBuf>,
     /// How the mesh is dealt out, where there are several ranks.
     pub dealing: Dealing,
+    /// How the equations are solved.
+    pub solves: SolverSettings,
 }
 
 /// Why a run could not be done, or ended early.
@@ -201,7 +203,7 @@ impl Run {
         let conditions = patches.iter().map(role).collect();
         let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
         let whole = (is_first && options.out.is_some()).then_some(mesh);
-        let (fluid, settings) = (case.fluid(&parameters), SolverSettings::default());
+        let (fluid, settings) = (case.fluid(&parameters), options.solves);
         let mut solver = Solver::new(&share.mesh, share.shared.halo(), patches, fluid, settings)?;
         solver.set_parameters(&parameters);
         let (velocity, pressure) = case.initial_values();

@@ -33,13 +33,21 @@ pub struct Settings {
     pub momentum_tolerance: f64,
     /// The residual of the pressure equation, relative to its right-hand side.
     pub pressure_tolerance: f64,
+    /// The same of each of the projections by which an impulse acts. They are approximate however
+    /// well they are solved; what they leave is for the solve of the step, at its own tolerance.
+    pub impulse_tolerance: f64,
     /// No solve takes more iterations than this, with the preconditioner that it begins with.
     pub iteration_limit: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { momentum_tolerance: 1e-7, pressure_tolerance: 1e-6, iteration_limit: 200 }
+        Self {
+            momentum_tolerance: 1e-7,
+            pressure_tolerance: 1e-6,
+            impulse_tolerance: 1e-2,
+            iteration_limit: 200,
+        }
     }
 }
 
@@ -55,7 +63,8 @@ pub struct Motion<'a> {
 pub struct StepOutcome {
     /// The solve of the momentum equation.
     pub momentum: Outcome,
-    /// The solve of the pressure equation; both solves where the step began with an impulse.
+    /// The solve of the pressure equation; where the step began with an impulse, the iterations of
+    /// its projections too.
     pub pressure: Outcome,
     /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the
     /// pressure solve.
@@ -245,7 +254,7 @@ impl Solver {
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
         self.halo.update(3, self.velocity.as_flattened_mut());
 
-        let mut pressure = self.project(Some(self.fluid.density));
+        let mut pressure = self.project(Some(self.fluid.density), self.settings.pressure_tolerance);
         let scale = self.fluid.density * rate;
         let potential = &self.potential;
         for_each(&mut self.pressure, |index, value| {
@@ -273,7 +282,7 @@ impl Solver {
         let mut total = Outcome { converged: true, ..Outcome::default() };
         for _ in 0..IMPULSE_PROJECTIONS {
             self.potential.fill(0.0);
-            let outcome = self.project(None);
+            let outcome = self.project(None, self.settings.impulse_tolerance);
             total.iterations += outcome.iterations;
             total.residual = outcome.residual;
             total.converged &= outcome.converged;
@@ -424,7 +433,7 @@ impl Solver {
 
     /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient.
     /// With a density, continuity is stabilised by the states of the present step.
-    fn project(&mut self, stabilised: Option<f64>) -> Outcome {
+    fn project(&mut self, stabilised: Option<f64>, tolerance: f64) -> Outcome {
         let rows = self.topology.rows();
         momentum::divergence(
             &self.topology,
@@ -450,7 +459,7 @@ impl Solver {
             &self.halo,
             &mut self.potential,
             &self.geometry.points,
-            self.settings.pressure_tolerance,
+            tolerance,
             through,
             self.boundary.is_open(),
         );

@@ -361,6 +361,47 @@ fn survives_a_wall_that_jumps() {
     assert!(fluxes[2].abs().max(fluxes[3].abs()) < 1e-12, "{fluxes:?}");
 }
 
+/// The projections of an impulse need not be solved well: the flow is the same, for half of the
+/// iterations.
+#[test]
+fn an_impulse_costs_no_more_than_it_is_worth() {
+    let run = |impulse_tolerance: f64| {
+        let mesh = box_of_tets([24, 12, 6], [0.0; 3], [2.0, 1.0, 0.5]);
+        let conditions = [
+            uniform([1.0, 0.0, 0.0]),
+            outlet(),
+            Condition::NoSlip,
+            Condition::NoSlip,
+            Condition::Slip,
+            Condition::Slip,
+        ];
+        let settings = Settings { impulse_tolerance, ..Settings::default() };
+        let mut solver =
+            Solver::new(&mesh, &Halo::none(), sides(&mesh, conditions), WATERY, settings).unwrap();
+        for _ in 0..10 {
+            solver.step(0.05, None).unwrap();
+        }
+        let pinched: Vec<Vector> = mesh
+            .points()
+            .iter()
+            .map(|&[x, y, z]| [x, y * (1.0 - 0.2 * (PI * x / 2.0).sin()), z])
+            .collect();
+        let outcome = solver.step(0.05, Some(Motion { points: &pinched })).unwrap();
+        assert!(outcome.pressure.converged);
+        // What flows in flows out, however the impulse was solved.
+        assert!(outcome.imbalance.abs() < 1e-5, "{outcome:?}");
+        (outcome.pressure.iterations, solver.velocity())
+    };
+    let (many, exact) = run(Settings::default().pressure_tolerance);
+    let (few, found) = run(Settings::default().impulse_tolerance);
+    assert!(10 * few < 7 * many, "{few} iterations in place of {many}");
+    let fastest = exact.iter().map(|&velocity| length(velocity)).fold(0.0, f64::max);
+    for (found, exact) in found.iter().zip(&exact) {
+        let apart = length(std::array::from_fn(|axis| found[axis] - exact[axis]));
+        assert!(apart < 1e-2 * fastest, "{found:?} {exact:?}, of {fastest}");
+    }
+}
+
 #[test]
 fn refuses_what_it_cannot_solve() {
     let (mesh, mut solver) = poiseuille([8, 4, 1], 0.0);
@@ -409,8 +450,12 @@ fn refuses_what_it_cannot_solve() {
 /// squeezed without losing volume.
 #[test]
 fn ranks_solve_the_same_equations() {
-    let settings =
-        Settings { momentum_tolerance: 1e-12, pressure_tolerance: 1e-10, iteration_limit: 500 };
+    let settings = Settings {
+        momentum_tolerance: 1e-12,
+        pressure_tolerance: 1e-10,
+        impulse_tolerance: 1e-10,
+        iteration_limit: 500,
+    };
     let mesh = box_of_tets([9, 5, 4], [0.0; 3], [2.0, 1.0, 0.8]);
     let inlet = || {
         let profile = Value::function(|place, time| place[1] * (1.0 - place[1]) * (1.0 + time));

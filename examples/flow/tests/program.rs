@@ -6,6 +6,7 @@ use std::sync::Arc;
 use tombolo_deform::communicator::threads;
 use tombolo_deform::mesh::FeatureSource;
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
+use tombolo_flow::Settings;
 use tombolo_flow::case::{Case, CaseError};
 use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
@@ -321,7 +322,9 @@ fn difference(a: &Path, b: &Path) -> Vec<(String, f64)> {
 #[test]
 fn ranks_solve_what_one_process_solves() {
     let (folder, case) = folder(CASE);
-    let alone = Options { out: Some(folder.path().join("alone")), ..headless(&case) };
+    let settings = Settings::default();
+    let solves = Settings { impulse_tolerance: settings.pressure_tolerance, ..settings };
+    let alone = Options { out: Some(folder.path().join("alone")), solves, ..headless(&case) };
     let expected = run(&alone);
     let dealings = [
         Dealing::default(),

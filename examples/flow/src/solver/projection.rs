@@ -139,7 +139,7 @@ impl Projection {
         halo: &Halo,
         potential: &mut [f64],
         points: &[Vector],
-        pressure_tolerance: f64,
+        relative: f64,
         through: f64,
         open: bool,
     ) -> Outcome {
@@ -158,8 +158,7 @@ impl Projection {
         let size = square.sqrt();
         let small = 1e-9 * through / used.max(1.0).sqrt();
         // The residual is a loss of mass, and as such says alone what is good enough.
-        let tolerance =
-            Tolerance { relative: 0.0, absolute: (pressure_tolerance * size).max(small) };
+        let tolerance = Tolerance { relative: 0.0, absolute: (relative * size).max(small) };
         if self.is_worn && self.refresh(self.solver.matrix(), points).is_err() {
             // The old one has served so far, if slowly.
             self.is_worn = false;
