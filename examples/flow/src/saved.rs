@@ -11,7 +11,7 @@ use crate::SolverError;
 use crate::ranks::agreed;
 use crate::solver::Solver;
 
-const MAGIC: &[u8] = b"flow state 1\n";
+const MAGIC: &[u8] = b"flow state 2\n";
 
 /// Why a state cannot be written, read or gone on from.
 #[derive(Debug, thiserror::Error)]

@@ -17,7 +17,7 @@ use crate::linear::{BiCgStab, BlockIncompleteLu, Outcome, for_each, sum};
 use crate::momentum::{self, ElementState, Known};
 use crate::ranks::{agreed, total};
 use crate::topology::Topology;
-use projection::Projection;
+use projection::{Projection, Start};
 
 /// How much of the energy that flows in at an outlet is damped; one half makes the energy of the
 /// scheme bounded.
@@ -228,6 +228,10 @@ impl Solver {
             return Err(SolverError::NotPositive { what: "the time step", value: time_step });
         }
         let moves = self.move_mesh(time_step, motion)?;
+        if !moves && !self.moving {
+            // A mesh that only pauses between two shapes of a schedule moves again in the next step.
+            self.projection.settle(&self.geometry.points);
+        }
         let end = self.time + time_step;
         let impulse = self.jump || moves != self.moving;
         let mut pressure_outcome = None;
@@ -254,7 +258,8 @@ impl Solver {
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
         self.halo.update(3, self.velocity.as_flattened_mut());
 
-        let mut pressure = self.project(Some(self.fluid.density), self.settings.pressure_tolerance);
+        let start = if impulse { Start::Zero } else { Start::Last };
+        let mut pressure = self.project(Some(self.fluid.density), start);
         let scale = self.fluid.density * rate;
         let potential = &self.potential;
         for_each(&mut self.pressure, |index, value| {
@@ -282,7 +287,7 @@ impl Solver {
         let mut total = Outcome { converged: true, ..Outcome::default() };
         for _ in 0..IMPULSE_PROJECTIONS {
             self.potential.fill(0.0);
-            let outcome = self.project(None, self.settings.impulse_tolerance);
+            let outcome = self.project(None, Start::Impulse);
             total.iterations += outcome.iterations;
             total.residual = outcome.residual;
             total.converged &= outcome.converged;
@@ -307,11 +312,14 @@ impl Solver {
             *velocity = std::array::from_fn(|axis| (new[axis] - old[axis]) / time_step);
             moves |= *velocity != [0.0; 3];
         }
+        if !self.halo.communicator().any(moves) {
+            return Ok(false);
+        }
         self.geometry = geometry;
         self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
         let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
         agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;
-        Ok(self.halo.communicator().any(moves))
+        Ok(true)
     }
 
     /// The shape of the mesh at the end of a motion.
@@ -433,7 +441,7 @@ impl Solver {
 
     /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient.
     /// With a density, continuity is stabilised by the states of the present step.
-    fn project(&mut self, stabilised: Option<f64>, tolerance: f64) -> Outcome {
+    fn project(&mut self, stabilised: Option<f64>, start: Start) -> Outcome {
         let rows = self.topology.rows();
         momentum::divergence(
             &self.topology,
@@ -454,11 +462,16 @@ impl Solver {
             );
         }
         let through: f64 = self.fluxes().into_iter().map(f64::abs).sum();
+        let tolerance = match start {
+            Start::Impulse => self.settings.impulse_tolerance,
+            Start::Zero | Start::Last => self.settings.pressure_tolerance,
+        };
         let outcome = self.projection.solve(
             &self.topology,
             &self.halo,
             &mut self.potential,
             &self.geometry.points,
+            start,
             tolerance,
             through,
             self.boundary.is_open(),

@@ -402,6 +402,42 @@ fn an_impulse_costs_no_more_than_it_is_worth() {
     }
 }
 
+/// Once the mesh rests, the pressure is solved as well as on a mesh that never was another.
+#[test]
+fn a_mesh_that_has_come_to_rest_costs_no_more_than_one_that_never_moved() {
+    let mesh = box_of_tets([24, 8, 8], [0.0; 3], [3.0, 1.0, 1.0]);
+    let pinched = |by: f64| -> Vec<Vector> {
+        let narrow = |x: f64| 1.0 - 0.5 * by * (1.0 - (2.0 * PI * x / 3.0).cos());
+        mesh.points().iter().map(|&[x, y, z]| [x, y * narrow(x), z * narrow(x)]).collect()
+    };
+    // The stream swells and ebbs, so that there is always something to solve.
+    let swelling = || {
+        let speed = Value::function(|_, time| 1.0 + 0.5 * (12.0 * time).sin());
+        Condition::Velocity([speed, Value::Uniform(0.0), Value::Uniform(0.0)])
+    };
+    let conditions = || {
+        let [a, b, c, d] = std::array::from_fn(|_| Condition::NoSlip);
+        [swelling(), outlet(), a, b, c, d]
+    };
+    let iterations = |mesh: &Mesh, moves: bool| -> usize {
+        let (halo, settings) = (Halo::none(), Settings::default());
+        let patches = sides(mesh, conditions());
+        let mut solver = Solver::new(mesh, &halo, patches, WATERY, settings).unwrap();
+        let mut step = |step: usize| {
+            let points = pinched(0.07 * step.min(10) as f64);
+            let motion = (moves && step <= 10).then_some(Motion { points: &points });
+            solver.step(0.02, motion).unwrap().pressure.iterations
+        };
+        for number in 1..=25 {
+            step(number);
+        }
+        (26..=40).map(step).sum()
+    };
+    let expected = iterations(&mesh.with_points(pinched(0.7)).unwrap(), false);
+    let found = iterations(&mesh, true);
+    assert!(found <= expected + 15, "{found} iterations in 15 steps, where {expected} will do");
+}
+
 #[test]
 fn refuses_what_it_cannot_solve() {
     let (mesh, mut solver) = poiseuille([8, 4, 1], 0.0);
