@@ -10,8 +10,9 @@
 //! - Linear tetrahedra for velocity and pressure, in the arbitrary Lagrangian-Eulerian frame
 //!   (Donea, Giuliani and Halleux 1982): nodal values travel with the mesh, and the convecting
 //!   velocity is `u - w` with the mesh velocity `w`.
-//! - Time: the second-order backward difference, convecting velocity extrapolated; the first-order
-//!   one in the first step and while the mesh moves.
+//! - Time: the second-order backward difference; the first-order one while the mesh moves, and in
+//!   each step that begins with an impulse: the first, the one in which the mesh starts or stops,
+//!   and where a parameter changes. The convecting velocity is extrapolated in all steps but those.
 //! - Momentum: convection linearised and implicit, SUPG (Brooks and Hughes 1982). One matrix for
 //!   the three components, solved by BiCGStab with ILU(0).
 //! - Pressure: incremental projection (van Kan 1986; Guermond, Minev and Shen 2006), with

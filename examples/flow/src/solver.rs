@@ -247,7 +247,7 @@ impl Solver {
             pressure_outcome = Some(self.apply_impulse());
         }
         let second_order = !impulse && !moves && self.history_length >= 2;
-        let rate = self.predict(time_step, second_order);
+        let rate = self.predict(time_step, second_order, !impulse);
         self.assemble(time_step, rate, end);
 
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
@@ -338,11 +338,13 @@ impl Solver {
     }
 
     /// Prepares the known part of the time derivative, the convecting velocity and the first guess
-    /// (in `scratch`); the rate.
-    fn predict(&mut self, time_step: f64, second_order: bool) -> f64 {
+    /// (in `scratch`); the rate. Nodal values travel with the mesh, so that they are extrapolated
+    /// while it moves too: wherever the history is `unbroken`.
+    fn predict(&mut self, time_step: f64, second_order: bool, unbroken: bool) -> f64 {
         let (now, before, mesh) = (&self.velocity, &self.previous_velocity, &self.mesh_velocity);
         self.scratch.resize(now.len(), [0.0; 3]);
-        let (last, weights) = if second_order { (-1.0, [2.0, -0.5]) } else { (0.0, [1.0, 0.0]) };
+        let weights = if second_order { [2.0, -0.5] } else { [1.0, 0.0] };
+        let last = if unbroken { -1.0 } else { 0.0 };
         for_each(&mut self.history, |index, value| {
             let (now, before) = (now[index], before[index]);
             *value =

@@ -221,7 +221,9 @@ fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
         let shift = place(f64::from(step) * time_step);
         let points: Vec<Vector> =
             mesh.points().iter().map(|&[x, y, z]| [x + shift * (1.0 - x), y, z]).collect();
-        solver.step(time_step, Some(Motion { points: &points })).unwrap();
+        let outcome = solver.step(time_step, Some(Motion { points: &points })).unwrap();
+        // The solve begins with a velocity that has grown on as before, which here is the solution.
+        assert!(step < 10 || outcome.momentum.iterations <= 2, "{step}: {outcome:?}");
     }
     let speed = (place(0.6) - place(0.59)) / time_step;
     for (velocity, (pressure, point)) in
