@@ -344,6 +344,12 @@ fn ranks_give_up_together() {
     assert!(!status.success());
     assert_eq!(text.matches("flow: ").count(), 1, "{text}");
     assert!(text.contains("flow: rank ") && text.contains("diverged"), "{text}");
+    // What only the first rank finds out.
+    let mut arguments = small.arguments(&["--headless"]);
+    arguments.extend(["--report".to_owned(), small.path("case.json/r.json").display().to_string()]);
+    arguments.drain(4..6);
+    let (status, text) = Run::flow_on(3, &arguments).finish(PATIENCE);
+    assert!(!status.success() && text.contains("case.json/r.json"), "{text}");
     case["mesh"] = json!("nowhere.msh");
     small.write("case.json", &case);
     let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(PATIENCE);

@@ -16,6 +16,8 @@ use tombolo::pipelines::language::Listen;
 use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
+use tombolo_flow::ranks::agreed;
+use tombolo_flow::report::make_file;
 
 /// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser,
 /// and given another shape while it runs.
@@ -162,6 +164,19 @@ fn on_ranks(
     work(Arc::new(Solo), Arc::new(BuiltIn)).map_err(|error| error.to_string())
 }
 
+/// Lets people and signals reach the run.
+fn open(run: &mut Run) -> Result<(), Box<dyn std::error::Error>> {
+    stop_on_signals(run.stopper())?;
+    let mut output = std::io::stdout();
+    let invitation = run.invitation(output.is_terminal());
+    let invitation = invitation.map_err(|error| format!("the links were not written: {error}"))?;
+    if let Some(invitation) = invitation {
+        // Where nobody reads it the run goes on; the links are in their file.
+        let _ = writeln!(output, "flow: {invitation}").and_then(|()| output.flush());
+    }
+    Ok(())
+}
+
 fn run(
     arguments: Arguments,
     ranks: Ranks,
@@ -201,20 +216,11 @@ fn run(
             ..Settings::default()
         },
     };
-    if let Some(file) = arguments.report.as_ref().filter(|_| is_first) {
-        // Before the run: what it comes to is not to be lost for a misspelt folder.
-        let opened = std::fs::OpenOptions::new().create(true).append(true).open(file);
-        opened.map_err(|error| format!("{}: {error}", file.display()))?;
+    if let Some(file) = &arguments.report {
+        make_file(&*ranks, file)?;
     }
-    let mut run = Run::solved_by(ranks, solvers, &options)?;
-    stop_on_signals(run.stopper())?;
-    let mut output = std::io::stdout();
-    let invitation = run.invitation(output.is_terminal());
-    let invitation = invitation.map_err(|error| format!("the links were not written: {error}"))?;
-    if let Some(invitation) = invitation {
-        writeln!(output, "flow: {invitation}")?;
-        output.flush()?;
-    }
+    let mut run = Run::solved_by(Arc::clone(&ranks), solvers, &options)?;
+    agreed(&*ranks, open(&mut run))?;
     let report = run.finish()?;
     if let Some(file) = arguments.report.filter(|_| is_first) {
         let text = serde_json::to_string_pretty(&report)? + "\n";

@@ -1,12 +1,18 @@
 //! What a run came to, as one JSON object.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
 
 use serde::Serialize;
+use tombolo::communicator::Communicator;
 use tombolo::stream::StreamCounts;
 use tombolo::{OrderReport, PipelineReport, Spread};
 
+use crate::folder::make_folder_of;
 use crate::history::Through;
+use crate::program::ProgramError;
+use crate::ranks::agreed;
 use crate::solver::{Solver, StepOutcome};
 
 /// The report of a run.
@@ -78,6 +84,20 @@ pub struct FlowReport {
     pub seconds: f64,
     #[serde(skip)]
     steps: u64,
+}
+
+/// Makes the file that the report of a run is to go to, with its folder: what the run comes to is not
+/// to be lost for a name at which no file can be, and what another run came to is not to be taken
+/// for it. The first rank does so. Collective.
+///
+/// # Errors
+/// [`ProgramError::File`], on several ranks the same on all of them.
+pub fn make_file(communicator: &dyn Communicator, file: &Path) -> Result<(), ProgramError> {
+    let made = match communicator.rank() {
+        0 => make_folder_of(file).and_then(|()| File::create(file)).map(drop),
+        _ => Ok(()),
+    };
+    agreed(communicator, made.map_err(|source| ProgramError::File { file: file.into(), source }))
 }
 
 impl FlowReport {

@@ -10,7 +10,7 @@ use tombolo_flow::Settings;
 use tombolo_flow::case::{Case, CaseError};
 use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
-use tombolo_flow::report::Report;
+use tombolo_flow::report::{Report, make_file};
 use tombolo_pipelines::files::{self, Compression};
 
 const CASE: &str = r#"{
@@ -364,6 +364,26 @@ fn ranks_solve_what_one_process_solves() {
         let [few, many] = [&expected, &report].map(|report| report.flow.pressure_iterations);
         assert!(many < 3.0 * few + 10.0, "{few} iterations, on {ranks} ranks {many}");
     }
+}
+
+#[test]
+fn the_file_of_the_report_is_made_with_its_folder_or_refused_by_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("new/report.json");
+    let make = |file: &Path| -> Vec<Option<String>> {
+        threads::run(2, |ranks| make_file(&ranks, file).err().map(|error| error.to_string()))
+    };
+    assert_eq!(make(&report), [None, None]);
+    // What a run before has left is not taken for the report of one that comes to no end.
+    std::fs::write(&report, "{}").unwrap();
+    assert_eq!(make(&report), [None, None]);
+    assert_eq!(std::fs::read_to_string(&report).unwrap(), "");
+    let refused = make(&report.join("report.json"));
+    assert!(
+        refused[0] == refused[1]
+            && refused[0].as_ref().is_some_and(|it| it.contains("report.json/report.json")),
+        "{refused:?}"
+    );
 }
 
 #[test]
