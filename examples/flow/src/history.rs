@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::Condition;
+use crate::folder::make_folder_of;
 use crate::solver::Solver;
 
 /// The flux through the domain, and the pressure that it takes.
@@ -59,6 +60,7 @@ impl History {
     /// seconds since the run began.
     pub(crate) fn create(file: &Path) -> Result<Self, (PathBuf, std::io::Error)> {
         let failed = |error| (file.to_owned(), error);
+        make_folder_of(file).map_err(failed)?;
         let mut lines = BufWriter::new(File::create(file).map_err(failed)?);
         writeln!(lines, "cycle,time,pressure_drop,mass_in,mass_out,seconds").map_err(failed)?;
         Ok(Self { file: file.into(), lines })

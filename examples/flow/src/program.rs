@@ -22,10 +22,11 @@ use tombolo_pipelines::language::{
 };
 
 use crate::case::{Case, CaseError};
+use crate::folder::make_folder_of;
 use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
 use crate::ranks::agreed;
-use crate::report::{FlowReport, MeshReport, Report};
+use crate::report::{FlowReport, MeshReport, Report, Unwritten};
 use crate::saved::{self, State, StateError};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
@@ -134,6 +135,7 @@ pub struct Run {
     /// Whether the flow is written step by step: by the first rank, and measured by all.
     has_history: bool,
     history: Option<History>,
+    unwritten: Unwritten,
 }
 
 /// The input that every rank reads from files.
@@ -219,6 +221,10 @@ impl Run {
             None => History::create(file),
         });
         let history = agreed(&*communicator, history.transpose().map_err(unwritten))?;
+        if let Some((file, _)) = &options.checkpoint {
+            let made = if is_first { make_folder_of(file) } else { Ok(()) };
+            agreed(&*communicator, made.map_err(|source| unwritten((file.clone(), source))))?;
+        }
         let adaptor = Adaptor::initialize(Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -240,6 +246,7 @@ impl Run {
             flow: FlowReport::default(),
             has_history: options.history.is_some(),
             history,
+            unwritten: Unwritten::default(),
             out: options.out.clone(),
             steps,
             checkpoint: options.checkpoint.clone(),
@@ -314,6 +321,7 @@ impl Run {
             stream: adaptor.stream,
             pipelines: adaptor.pipelines,
             flow: self.flow,
+            unwritten: self.unwritten.told,
             error,
         })
     }
@@ -369,7 +377,8 @@ impl Run {
                     history.add(cycle, time, through, seconds).map_err(unwritten)
                 };
                 let added = self.history.as_mut().map_or(Ok(()), add);
-                agreed(&*self.communicator, added)?;
+                let added = agreed(&*self.communicator, added);
+                self.note("the history", added);
             }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
@@ -377,13 +386,24 @@ impl Run {
                 && (steering.stop || self.solver.cycle() % *every == 0)
             {
                 let checkpoint = self.adaptor.checkpoint();
-                saved::write(&*self.communicator, file, &self.solver, &checkpoint)?;
+                let saved = saved::write(&*self.communicator, file, &self.solver, &checkpoint);
+                self.note("the state", saved);
             }
             if steering.stop {
                 break;
             }
         }
         Ok(())
+    }
+
+    /// Tells what could not be written at the end of a step. A run does not end for that: what was
+    /// written before is still there, and there may be room again the next time.
+    fn note<E: std::fmt::Display>(&mut self, what: &'static str, written: Result<(), E>) {
+        if let Some(told) = self.unwritten.note(what, self.solver.cycle(), written)
+            && self.communicator.rank() == 0
+        {
+            eprintln!("flow: {told}; the run goes on");
+        }
     }
 
     /// Writes the mesh as it is, its features, the velocity and the pressure, in the numbers of the

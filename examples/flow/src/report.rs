@@ -1,6 +1,7 @@
 //! What a run came to, as one JSON object.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
 use std::fs::File;
 use std::path::Path;
 
@@ -36,6 +37,10 @@ pub struct Report {
     pub pipelines: Vec<PipelineReport>,
     /// The flow.
     pub flow: FlowReport,
+    /// What could not be written while the run went on, and why: the saved state, the history. Of
+    /// several failures in a row the first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unwritten: Vec<String>,
     /// Why the run ended early, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
@@ -84,6 +89,34 @@ pub struct FlowReport {
     pub seconds: f64,
     #[serde(skip)]
     steps: u64,
+}
+
+/// Keeps in mind what could not be written while the run went on.
+#[derive(Debug, Default)]
+pub(crate) struct Unwritten {
+    /// What was told.
+    pub(crate) told: Vec<String>,
+    failing: BTreeSet<&'static str>,
+}
+
+impl Unwritten {
+    /// Takes note of an attempt; what is to be told, where it is the first in a row that failed.
+    pub(crate) fn note(
+        &mut self,
+        what: &'static str,
+        cycle: u64,
+        written: Result<(), impl Display>,
+    ) -> Option<&str> {
+        let Err(error) = written else {
+            self.failing.remove(what);
+            return None;
+        };
+        if !self.failing.insert(what) {
+            return None;
+        }
+        self.told.push(format!("cycle {cycle}: {what} could not be written: {error}"));
+        self.told.last().map(String::as_str)
+    }
 }
 
 /// Makes the file that the report of a run is to go to, with its folder: what the run comes to is not

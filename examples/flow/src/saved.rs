@@ -8,6 +8,7 @@ use tombolo::{Checkpoint, CheckpointError};
 use tombolo_pipelines::files::write_durably;
 
 use crate::SolverError;
+use crate::folder::make_folder_of;
 use crate::ranks::agreed;
 use crate::solver::Solver;
 
@@ -53,6 +54,7 @@ pub(crate) fn write(
 }
 
 fn replace(file: &Path, states: &[Vec<u8>]) -> io::Result<()> {
+    make_folder_of(file)?;
     write_durably(file, |out| {
         out.write_all(MAGIC)?;
         for state in states {

@@ -366,6 +366,33 @@ fn ranks_solve_what_one_process_solves() {
     }
 }
 
+/// A state that cannot be saved, and a history that cannot be gone on with, are told; the run goes
+/// on.
+#[test]
+fn a_run_goes_on_where_its_state_cannot_be_saved() {
+    let (folder, case) = folder(CASE);
+    let at = |name: &str| folder.path().join(name);
+    let every = 3.try_into().unwrap();
+    let saving = |name: &str| Options { checkpoint: Some((at(name), every)), ..headless(&case) };
+    // Folders are made.
+    let options = Options { history: Some(at("tables/history.csv")), ..saving("new/flow.state") };
+    let report = run(&options);
+    assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+    assert!(at("new/flow.state").is_file() && at("tables/history.csv").is_file());
+    assert!(report.unwritten.is_empty(), "{:?}", report.unwritten);
+    // Where they cannot be, that is told before the run.
+    let refused = Run::new(&saving("case.json/flow.state")).err().unwrap().to_string();
+    assert!(refused.contains("case.json/flow.state"), "{refused}");
+    // A folder lies where the state should.
+    std::fs::create_dir_all(at("taken/flow.state")).unwrap();
+    let options = Options { out: Some(at("out")), ..saving("taken/flow.state") };
+    let report = run(&options);
+    assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+    let [told] = &report.unwritten[..] else { panic!("{:?}", report.unwritten) };
+    assert!(told.starts_with("cycle 3: the state") && told.contains("flow.state"), "{told}");
+    assert!(at("out/final.vtu").is_file());
+}
+
 #[test]
 fn the_file_of_the_report_is_made_with_its_folder_or_refused_by_all() {
     let folder = tempfile::tempdir().unwrap();
