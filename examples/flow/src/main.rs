@@ -58,7 +58,7 @@ struct Arguments {
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT|unix:/PATH", conflicts_with = "headless")]
     listen: Option<Listen>,
-    /// Save the state of the run every so many steps, and when it is stopped
+    /// Save the state of the run every so many steps, and at the end
     #[arg(long, value_name = "N")]
     checkpoint_every: Option<NonZeroU64>,
     /// The file of the state; without it flow.state in the folder of the output

@@ -52,8 +52,7 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Where the flow is written step by step, as comma-separated values.
     pub history: Option<PathBuf>,
-    /// Where the state of the run is saved, and after how many steps again; at the end of a run that is
-    /// stopped too.
+    /// Where the state of the run is saved, and after how many steps again; at the end of the run too.
     pub checkpoint: Option<(PathBuf, NonZeroU64)>,
     /// The saved state that the run goes on from.
     pub restart: Option<PathBuf>,
@@ -382,8 +381,9 @@ impl Run {
             }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
+            let is_last = steering.stop || self.steps == Some(self.solver.cycle());
             if let Some((file, every)) = &self.checkpoint
-                && (steering.stop || self.solver.cycle() % *every == 0)
+                && (is_last || self.solver.cycle() % *every == 0)
             {
                 let checkpoint = self.adaptor.checkpoint();
                 let saved = saved::write(&*self.communicator, file, &self.solver, &checkpoint);

@@ -394,6 +394,21 @@ fn a_run_goes_on_where_its_state_cannot_be_saved() {
 }
 
 #[test]
+fn the_state_at_the_end_is_saved_too() {
+    let (folder, case) = folder(CASE);
+    let state = folder.path().join("flow.state");
+    let saving = Options {
+        steps: Some(7),
+        checkpoint: Some((state.clone(), 3.try_into().unwrap())),
+        ..headless(&case)
+    };
+    assert_eq!(run(&saving).cycles, 7);
+    // As many steps have been done before this one begins.
+    let report = run(&Options { steps: Some(1), restart: Some(state), ..headless(&case) });
+    assert_eq!((report.cycles, report.error.as_deref()), (7, None));
+}
+
+#[test]
 fn the_file_of_the_report_is_made_with_its_folder_or_refused_by_all() {
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("new/report.json");
