@@ -26,6 +26,10 @@ const BACKFLOW: f64 = 0.5;
 /// How often the velocity is projected at the beginning of a step with an impulse.
 const IMPULSE_PROJECTIONS: usize = 4;
 
+/// How much longer than the last one a step may be with a time derivative of second order, which is
+/// stable up to 1 + sqrt(2) (Grigorieff 1983).
+const MOST_GROWTH: f64 = 2.0;
+
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -97,8 +101,8 @@ pub struct Solver {
     moving: bool,
     /// Whether the boundary values jump before the next step.
     jump: bool,
-    /// How many steps of the present, unbroken history there are for the time derivative.
-    history_length: u32,
+    /// The length of the last step.
+    last_step: f64,
 
     momentum: SparseMatrix<1>,
     momentum_preconditioner: BlockIncompleteLu,
@@ -162,7 +166,7 @@ impl Solver {
             mesh_velocity: vec![[0.0; 3]; vertices],
             moving: false,
             jump: true,
-            history_length: 0,
+            last_step: 0.0,
             momentum: topology.zeros.clone(),
             momentum_preconditioner: BlockIncompleteLu::new(&topology.zeros, &topology.diagonal),
             momentum_solver: BiCgStab::default(),
@@ -186,7 +190,6 @@ impl Solver {
             self.velocity[vertex] = [0, 1, 2].map(|axis: usize| velocity[axis].at(&place));
             self.pressure[vertex] = pressure.at(&place);
         }
-        self.history_length = 0;
         self.jump = true;
     }
 
@@ -213,6 +216,9 @@ impl Solver {
     ///
     /// The mesh velocity over the step is the displacement divided by the time step. No-slip walls
     /// take the fluid with them; a prescribed velocity is taken as it stands.
+    ///
+    /// Steps may have any lengths: the weights of the time derivative follow them. Behind a step
+    /// that is less than half as long it is of first order, as the second order is unstable there.
     ///
     /// # Errors
     /// [`SolverError::Inverted`] for a motion that turns an element inside out, and
@@ -246,8 +252,11 @@ impl Solver {
             self.halo.update(3, self.velocity.as_flattened_mut());
             pressure_outcome = Some(self.apply_impulse());
         }
-        let second_order = !impulse && !moves && self.history_length >= 2;
-        let rate = self.predict(time_step, second_order, !impulse);
+        // How much longer this step is than the last; nothing is behind an impulse.
+        let growth = (!impulse).then(|| time_step / self.last_step);
+        let second_order = !moves && growth.is_some_and(|growth| growth <= MOST_GROWTH);
+        let growth = growth.unwrap_or(0.0).min(MOST_GROWTH);
+        let rate = self.predict(time_step, growth, second_order);
         self.assemble(time_step, rate, end);
 
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
@@ -274,7 +283,7 @@ impl Solver {
         }
         self.moving = moves;
         self.jump = false;
-        self.history_length = if impulse { 2 } else { self.history_length.saturating_add(1) };
+        self.last_step = time_step;
         self.cycle += 1;
         self.time = end;
         self.check_finite()?;
@@ -339,12 +348,17 @@ impl Solver {
 
     /// Prepares the known part of the time derivative, the convecting velocity and the first guess
     /// (in `scratch`); the rate. Nodal values travel with the mesh, so that they are extrapolated
-    /// while it moves too: wherever the history is `unbroken`.
-    fn predict(&mut self, time_step: f64, second_order: bool, unbroken: bool) -> f64 {
+    /// while it moves too, by `growth`: the length of the step in lengths of the last, 0 where nothing
+    /// is behind it.
+    fn predict(&mut self, time_step: f64, growth: f64, second_order: bool) -> f64 {
         let (now, before, mesh) = (&self.velocity, &self.previous_velocity, &self.mesh_velocity);
         self.scratch.resize(now.len(), [0.0; 3]);
-        let weights = if second_order { [2.0, -0.5] } else { [1.0, 0.0] };
-        let last = if unbroken { -1.0 } else { 0.0 };
+        let (rate, weights) = if second_order {
+            let both = 1.0 + growth;
+            ((1.0 + 2.0 * growth) / both, [both, -growth * growth / both])
+        } else {
+            (1.0, [1.0, 0.0])
+        };
         for_each(&mut self.history, |index, value| {
             let (now, before) = (now[index], before[index]);
             *value =
@@ -352,14 +366,14 @@ impl Solver {
         });
         for_each(&mut self.scratch, |index, value| {
             let (now, before) = (now[index], before[index]);
-            *value = std::array::from_fn(|c| now[c] + last * (before[c] - now[c]));
+            *value = std::array::from_fn(|c| now[c] + growth * (now[c] - before[c]));
         });
         let guess = &self.scratch;
         for_each(&mut self.convecting, |index, value| {
             let (guess, mesh) = (guess[index], mesh[index]);
             *value = std::array::from_fn(|c| guess[c] - mesh[c]);
         });
-        if second_order { 1.5 / time_step } else { 1.0 / time_step }
+        rate / time_step
     }
 
     /// Fills the momentum matrix and its right-hand side, boundary conditions included.

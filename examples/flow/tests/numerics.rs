@@ -241,6 +241,33 @@ fn piston_accelerates_the_fluid_with_the_pressure_of_newton() {
     }
 }
 
+/// A stream that is driven faster and faster has the pressure of Newton in every step, however long
+/// the steps are.
+#[test]
+fn steps_of_other_lengths_keep_the_acceleration() {
+    let mesh = box_of_tets([8, 3, 3], [0.0; 3], [1.0, 0.3, 0.3]);
+    let acceleration = 0.8;
+    let speed = Value::function(move |_, time| acceleration * time);
+    let conditions = [
+        Condition::Velocity([speed, Value::Uniform(0.0), Value::Uniform(0.0)]),
+        outlet(),
+        Condition::Slip,
+        Condition::Slip,
+        Condition::Slip,
+        Condition::Slip,
+    ];
+    let patches = sides(&mesh, conditions);
+    let mut solver =
+        Solver::new(&mesh, &Halo::none(), patches, WATERY, Settings::default()).unwrap();
+    for step in 0..60 {
+        let time_step = [0.02, 0.01, 0.015, 0.05, 0.04][step / 12];
+        solver.step(time_step, None).unwrap();
+        let driven = WATERY.density * acceleration;
+        let drop = solver.mean_pressures()[0].0 - solver.mean_pressures()[1].0;
+        assert!(step < 6 || (drop - driven).abs() < 2e-2 * driven, "step {step}: {drop} {driven}");
+    }
+}
+
 /// Decaying Taylor-Green vortices in a periodic cell's quarter (frictionless walls), on a fixed
 /// mesh and on a shaken one.
 fn vortex_error(n: usize, time_step: f64, amplitude: f64) -> f64 {

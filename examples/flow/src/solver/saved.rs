@@ -26,7 +26,7 @@ impl Solver {
         writer.f64s(&self.parameters);
         writer.u8(self.moving.into());
         writer.u8(self.jump.into());
-        writer.u32(self.history_length);
+        writer.f64s(&[self.last_step]);
         let fluid = self.fluid;
         writer.f64s(&[fluid.density, fluid.viscosity]);
         writer.u64(self.velocity.len() as u64);
@@ -73,7 +73,7 @@ impl Solver {
         }
         self.parameters = reader.f64s(count)?;
         (self.moving, self.jump) = (reader.u8()? != 0, reader.u8()? != 0);
-        self.history_length = reader.u32()?;
+        self.last_step = reader.f64s(1)?[0];
         let fluid = reader.f64s(2)?;
         (self.fluid.density, self.fluid.viscosity) = (fluid[0], fluid[1]);
         let vertices = self.velocity.len();
