@@ -356,6 +356,41 @@ impl Boundary {
         self.impose_slip(velocity, mesh_velocity);
     }
 
+    /// Refuses values that are not finite.
+    pub fn check(
+        &self,
+        points: &[Vector],
+        time: f64,
+        parameters: &[f64],
+    ) -> Result<(), SolverError> {
+        let not_finite = |patch: usize, quantity: &'static str, vertex: usize, value: f64| {
+            Err(SolverError::NotFinite {
+                patch: self.patches[patch].name.clone(),
+                quantity,
+                position: points[vertex],
+                value,
+            })
+        };
+        for (vertex, rule) in self.rules.iter().enumerate() {
+            if let Rule::Prescribed(patch) = *rule
+                && let Condition::Velocity(values) = &self.patches[patch].condition
+            {
+                let place = Place { position: points[vertex], time, parameters };
+                let mut values = values.iter().map(|value| value.at(&place));
+                if let Some(value) = values.find(|value| !value.is_finite()) {
+                    return not_finite(patch, "velocity", vertex, value);
+                }
+            }
+        }
+        for outlet in &self.outlets {
+            let value = self.outlet_pressure(outlet, points, time, parameters);
+            if !value.is_finite() {
+                return not_finite(outlet.patch, "pressure", outlet.vertex as usize, value);
+            }
+        }
+        Ok(())
+    }
+
     /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's,
     /// from the mesh.
     pub fn impose_slip(&self, velocity: &mut [Vector], mesh_velocity: &[Vector]) {

@@ -53,6 +53,18 @@ pub enum SolverError {
         /// Its value.
         value: f64,
     },
+    /// A boundary value that is not finite.
+    #[error("the {quantity} on '{patch}' would be {value} at ({:.6}, {:.6}, {:.6}); it must be finite", position[0], position[1], position[2])]
+    NotFinite {
+        /// The patch.
+        patch: String,
+        /// Velocity or pressure.
+        quantity: &'static str,
+        /// Where.
+        position: Vector,
+        /// The value.
+        value: f64,
+    },
     /// A state that was saved of something else.
     #[error(
         "the saved state is not that of this mesh; expected one of the same case on as many ranks"

@@ -128,6 +128,7 @@ pub struct Run {
     /// The mesh as it was read, on the rank that writes it.
     whole: Option<Mesh>,
     points: Vec<Vector>,
+    /// The parameters that are asked for; where they make no flow, the solver still has those before.
     parameters: Vec<f64>,
     worst: MeshReport,
     flow: FlowReport,
@@ -347,9 +348,15 @@ impl Run {
                 }
             }
             if !steering.parameters.is_empty() {
-                self.solver.set_parameters(&self.parameters);
-                if let Err(error) = self.solver.set_fluid(self.case.fluid(&self.parameters)) {
-                    eprintln!("flow: cycle {}: {error}; the fluid stays as it was", step.cycle);
+                let fluid = self.case.fluid(&self.parameters);
+                let changed = self.solver.change(&self.parameters, fluid, time_step);
+                if let Err(error) = changed
+                    && self.communicator.rank() == 0
+                {
+                    eprintln!(
+                        "flow: cycle {}: {error}; the flow goes on with the parameters before",
+                        step.cycle
+                    );
                 }
             }
             let moved = match steering.motion {

@@ -1,6 +1,7 @@
 //! One time step after the other.
 
 mod measures;
+mod parameters;
 mod projection;
 mod saved;
 
@@ -191,25 +192,6 @@ impl Solver {
             self.pressure[vertex] = pressure.at(&place);
         }
         self.jump = true;
-    }
-
-    /// Sets the parameters that boundary values may depend on; a change acts from the next step on,
-    /// as a jump.
-    pub fn set_parameters(&mut self, parameters: &[f64]) {
-        if self.parameters != parameters {
-            self.parameters = parameters.to_vec();
-            self.jump = true;
-        }
-    }
-
-    /// Changes the fluid from the next step on.
-    ///
-    /// # Errors
-    /// [`SolverError::NotPositive`]; the fluid then stays as it is.
-    pub fn set_fluid(&mut self, fluid: Fluid) -> Result<(), SolverError> {
-        fluid.check()?;
-        self.fluid = fluid;
-        Ok(())
     }
 
     /// Goes on by one time step; `motion` says where the mesh is at its end, where it moves.

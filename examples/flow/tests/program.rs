@@ -393,6 +393,36 @@ fn a_run_goes_on_where_its_state_cannot_be_saved() {
     assert!(at("out/final.vtu").is_file());
 }
 
+/// A parameter that would make a boundary value infinite is refused, and the run goes on as before
+/// until another comes.
+#[test]
+fn a_parameter_that_makes_no_flow_is_refused() {
+    let divided = CASE
+        .replace("y * (1 - y)", "y * (1 - y) / thickness")
+        .replace("\"minimum\": 0.1", "\"minimum\": 0")
+        .replace("0.01 * thickness", "0.01 + 0 * thickness");
+    let (folder, case) = folder(&divided);
+    let orders = folder.path().join("orders.json");
+    let change = |cycle: u64, value: f64| {
+        format!(
+            r#"{{ "at": {{ "cycle": {cycle} }}, "parameter": {{ "name": "thickness", "value": {value} }} }}"#
+        )
+    };
+    let flow_in = |orders_text: String, ranks: usize| {
+        std::fs::write(&orders, orders_text).unwrap();
+        let report = run_on(ranks, &Options { orders: Some(orders.clone()), ..headless(&case) });
+        assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+        report.flow.mass_in
+    };
+    let before = flow_in("[]".into(), 1);
+    for ranks in [1, 2] {
+        let refused = flow_in(format!("[{}]", change(3, 0.0)), ranks);
+        assert!((refused - before).abs() < 1e-9 * before, "{refused} {before}");
+        let halved = flow_in(format!("[{}, {}]", change(3, 0.0), change(6, 2.0)), ranks);
+        assert!((halved - 0.5 * before).abs() < 1e-9 * before, "{halved} {before}");
+    }
+}
+
 #[test]
 fn the_state_at_the_end_is_saved_too() {
     let (folder, case) = folder(CASE);

@@ -12,12 +12,6 @@ use crate::geometry::Geometry;
 use crate::ranks::agreed;
 
 impl Solver {
-    /// The parameters that boundary values may depend on.
-    #[must_use]
-    pub fn parameters(&self) -> &[f64] {
-        &self.parameters
-    }
-
     /// Writes down all that the steps to come depend on, of this rank's part.
     pub fn save(&self, writer: &mut Writer) {
         writer.u64(self.cycle);
