@@ -470,6 +470,9 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
 }
 
 fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {
+    if options.replay.is_some() {
+        return Ok(Vec::new());
+    }
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
         Some(file) => Ok(Settings::default().orders_from_file(file)?.orders),

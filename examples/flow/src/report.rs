@@ -53,21 +53,22 @@ pub struct MeshReport {
     pub vertices: usize,
     /// How many cells.
     pub cells: usize,
-    /// The most inverted cells of any shape of the run.
+    /// The most inverted cells of any shape since the run began or was restarted.
     pub inverted: usize,
-    /// The least scaled Jacobian of any shape of the run.
+    /// The least scaled Jacobian of any of these shapes.
     pub min_scaled_jacobian: f64,
 }
 
-/// The flow at the end of a run, and what its solves took.
+/// The flow at the end of a run, and what its solves took since it began or was restarted.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FlowReport {
     /// Volume per time that flows in where the velocity is prescribed.
     pub mass_in: f64,
     /// Volume per time that flows out where the pressure is prescribed.
     pub mass_out: f64,
-    /// The greatest flux through the whole boundary in any step, relative to what flowed through it
-    /// then.
+    /// The greatest flux through the whole boundary in any step since the run began or was restarted,
+    /// relative to the most that flowed through it; where nothing does, to the greatest velocity
+    /// times the area of the boundary.
     pub worst_imbalance: f64,
     /// Mean pressure where the velocity is prescribed less that where the pressure is.
     pub pressure_drop: f64,
@@ -89,7 +90,13 @@ pub struct FlowReport {
     pub seconds: f64,
     #[serde(skip)]
     steps: u64,
+    /// The most that flowed through the boundary in any step.
+    #[serde(skip)]
+    most_through: f64,
 }
+
+/// Less than this part of what could flow through the boundary is nothing but rounding.
+const NOTHING: f64 = 1e-9;
 
 /// Keeps in mind what could not be written while the run went on.
 #[derive(Debug, Default)]
@@ -137,9 +144,8 @@ impl FlowReport {
     /// Counts one step.
     pub(crate) fn count(&mut self, outcome: &StepOutcome, solver: &Solver) {
         let through: f64 = 0.5 * solver.fluxes().into_iter().map(f64::abs).sum::<f64>();
-        if through > 0.0 {
-            self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs() / through);
-        }
+        self.most_through = self.most_through.max(through);
+        self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs());
         self.steps += 1;
         self.momentum_iterations += outcome.momentum.iterations as f64;
         self.pressure_iterations += outcome.pressure.iterations as f64;
@@ -151,11 +157,13 @@ impl FlowReport {
         let steps = self.steps.max(1) as f64;
         self.momentum_iterations /= steps;
         self.pressure_iterations /= steps;
-        for ((patch, flux), (pressure, _)) in
+        let mut whole_area = 0.0;
+        for ((patch, flux), (pressure, area)) in
             solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
         {
             self.fluxes.insert(patch.name.clone(), flux);
             self.mean_pressures.insert(patch.name.clone(), pressure);
+            whole_area += area;
         }
         Through {
             mass_in: self.mass_in,
@@ -163,6 +171,12 @@ impl FlowReport {
             pressure_drop: self.pressure_drop,
         } = Through::now(solver);
         self.max_velocity = solver.max_velocity();
+        let possible = self.max_velocity * whole_area;
+        let through =
+            if self.most_through > NOTHING * possible { self.most_through } else { possible };
+        if through > 0.0 {
+            self.worst_imbalance /= through;
+        }
         self.courant = solver.courant(time_step);
     }
 }

@@ -162,6 +162,10 @@ fn names_what_is_wrong_in_a_case() {
         &["viscosity"],
     );
     expect(
+        failure("\"density\": 1.0", "\"density\": \"max(0.01, x - 1)\""),
+        &["case.json:3:", "density", "the same everywhere"],
+    );
+    expect(
         failure("\"density\": 1.0", "\"density\": -1.0"),
         &["case.json:3:", "density", "positive"],
     );
@@ -421,6 +425,48 @@ fn a_parameter_that_makes_no_flow_is_refused() {
         let halved = flow_in(format!("[{}, {}]", change(3, 0.0), change(6, 2.0)), ranks);
         assert!((halved - 0.5 * before).abs() < 1e-9 * before, "{halved} {before}");
     }
+}
+
+/// A replay has all its orders from the journal.
+#[test]
+fn a_replay_does_not_read_the_orders_of_the_case() {
+    let (folder, case) = folder(&CASE.replace(
+        "\"steps\": 12",
+        "\"steps\": 12, \"orders\": \"orders.json\", \"pipelines\": \"pipelines.json\"",
+    ));
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("orders.json"), ORDERS).unwrap();
+    std::fs::write(at("pipelines.json"), r#"{ "version": 1, "journal": "journal.jsonl" }"#).unwrap();
+    let applied = |options: Options| {
+        let report = run(&options);
+        let json = serde_json::to_value(&report.orders).unwrap();
+        let orders = json.as_array().unwrap();
+        orders.iter().filter(|order| order["status"] == "applied").count()
+    };
+    assert_eq!(applied(Options { out: Some(at("out")), ..headless(&case) }), 2);
+    std::fs::remove_file(at("orders.json")).unwrap();
+    let replay = Some(at("out/journal.jsonl"));
+    assert_eq!(applied(Options { out: Some(at("again")), replay, ..headless(&case) }), 2);
+}
+
+/// A lid drags the fluid along in a box that nothing enters: no flux is lost there.
+#[test]
+fn a_closed_box_has_no_imbalance() {
+    let cavity = CASE
+        .replace(r#""velocity": ["y * (1 - y)", 0, 0]"#, r#""wall": "no_slip""#)
+        .replace(r#""pressure": 0"#, r#""wall": "no_slip""#)
+        .replace(r#""y-max": { "wall": "no_slip" }"#, r#""y-max": { "velocity": [1, 0, 0] }"#);
+    let (_folder, case) = folder(&cavity);
+    let report = run(&headless(&case));
+    assert!(report.flow.max_velocity > 0.5 && report.flow.worst_imbalance < 1e-6);
+}
+
+#[test]
+fn one_process_cannot_be_left_empty() {
+    let (_folder, case) = folder(CASE);
+    let dealing = Dealing { empty_rank: Some(0), ..Dealing::default() };
+    let refused = Run::new(&Options { dealing, ..headless(&case) }).err().unwrap().to_string();
+    assert!(refused.contains("rank 0 cannot be left empty"), "{refused}");
 }
 
 #[test]

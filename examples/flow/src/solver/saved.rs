@@ -38,8 +38,7 @@ impl Solver {
     /// of a solver that was just made. Collective.
     ///
     /// # Errors
-    /// [`SolverError::Saved`] for a state of another mesh, and what a mesh there is refused for; the
-    /// same on all ranks.
+    /// [`SolverError::Saved`] for a state of another mesh; the same on all ranks.
     pub fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), SolverError> {
         let read = self.read(reader).map_err(|Garbled { .. }| SolverError::Saved);
         let worn = agreed(self.halo.communicator(), read)?;
