@@ -359,21 +359,23 @@ impl Run {
                     );
                 }
             }
-            let moved = match steering.motion {
-                Some(motion) => {
-                    self.points.copy_from_slice(&motion.coordinates);
-                    true
+            let coordinates = steering.motion.map(|motion| motion.coordinates);
+            let motion = coordinates.as_deref().map(|points| Motion { points });
+            let outcome = match self.solver.step(time_step, motion) {
+                Ok(outcome) => outcome,
+                Err(error) => {
+                    // The mesh that the flow belongs to: a shape that is refused is none of the run's.
+                    self.points = self.solver.points();
+                    return Err(error.into());
                 }
-                None => false,
             };
-            if moved {
+            if let Some(coordinates) = coordinates {
+                self.points.copy_from_slice(&coordinates);
                 let shape = self.share.measure(&*self.communicator, &self.points);
                 self.worst.inverted = self.worst.inverted.max(shape.inverted);
                 self.worst.min_scaled_jacobian =
                     self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
-            let motion = moved.then_some(Motion { points: &self.points });
-            let outcome = self.solver.step(time_step, motion)?;
             self.flow.count(&outcome, &self.solver);
             if self.has_history {
                 let (cycle, time, through) =

@@ -469,6 +469,42 @@ fn one_process_cannot_be_left_empty() {
     assert!(refused.contains("rank 0 cannot be left empty"), "{refused}");
 }
 
+/// The table of a run that is killed and restarted is that of one run; until it goes on, nothing of
+/// it is lost.
+#[test]
+fn a_history_goes_on_where_the_run_does() {
+    let (folder, case) = folder(CASE);
+    let at = |name: &str| folder.path().join(name);
+    let saving = Options {
+        steps: Some(7),
+        checkpoint: Some((at("flow.state"), 5.try_into().unwrap())),
+        history: Some(at("history.csv")),
+        ..headless(&case)
+    };
+    run(&saving);
+    // A line of a step behind the state, and one that was being written.
+    let table = std::fs::read_to_string(at("history.csv")).unwrap();
+    std::fs::write(at("history.csv"), format!("{table}8,0.4,0,0,0,99\n1")).unwrap();
+    let torn = std::fs::read_to_string(at("history.csv")).unwrap();
+    let further =
+        Options { steps: Some(12), restart: Some(at("flow.state")), ..saving.clone() };
+    drop(Run::new(&further).unwrap());
+    assert_eq!(std::fs::read_to_string(at("history.csv")).unwrap(), torn);
+    run(&further);
+    let whole = std::fs::read_to_string(at("history.csv")).unwrap();
+    assert!(whole.starts_with(&table), "{whole}");
+    let lines: Vec<Vec<f64>> = whole
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|value| value.parse().unwrap()).collect())
+        .collect();
+    assert!(lines.iter().zip(1..).all(|(line, cycle)| line[0] == f64::from(cycle)), "{whole}");
+    assert!(lines.len() == 12 && lines.is_sorted_by_key(|line| line[5]), "{whole}");
+    // Nor is a table lost to a run that does not begin.
+    drop(Run::new(&Options { history: Some(at("history.csv")), ..headless(&case) }).unwrap());
+    assert_eq!(std::fs::read_to_string(at("history.csv")).unwrap(), whole);
+}
+
 #[test]
 fn the_state_at_the_end_is_saved_too() {
     let (folder, case) = folder(CASE);
