@@ -165,8 +165,8 @@ pub(crate) struct Boundary {
     pub held: Vec<[bool; 3]>,
     /// The outlet vertices that this rank owns.
     pub outlets: Vec<OutletVertex>,
-    /// Whether any rank has one.
-    open: bool,
+    /// For each patch whether any rank has one there.
+    has_outlets: Vec<bool>,
     /// For each patch how many of its triangles are counted on this rank: they are the first.
     counted: Vec<usize>,
     slip: Vec<SlipVertex>,
@@ -218,7 +218,7 @@ impl Boundary {
             rules,
             held,
             outlets: Vec::new(),
-            open: false,
+            has_outlets: Vec::new(),
             counted,
             slip: Vec::new(),
         })
@@ -283,7 +283,7 @@ impl Boundary {
             }
         }
         communicator.reduce(Reduction::Sum, &mut sizes);
-        self.open = sizes.iter().any(|&size| size > 0.0);
+        self.has_outlets = sizes.chunks(2).map(|size| size[0] > 0.0).collect();
         for outlet in &mut self.outlets {
             let patch = 2 * outlet.patch;
             outlet.yield_rate = OUTLET_STIFFNESS * sizes[patch] / sizes[patch + 1];
@@ -328,7 +328,22 @@ impl Boundary {
 
     /// Whether some part of the boundary lets the fluid choose how much of it passes.
     pub fn is_open(&self) -> bool {
-        self.open
+        self.has_outlets.contains(&true)
+    }
+
+    /// Refuses an outlet that walls and inlets leave no vertex of, so that nothing gets out there.
+    /// Collective.
+    pub fn check_outlets(&self, communicator: &dyn Communicator) -> Result<(), SolverError> {
+        let mut counts: Vec<f64> = self.counted.iter().map(|&counted| counted as f64).collect();
+        communicator.reduce(Reduction::Sum, &mut counts);
+        for (patch, (count, has_outlets)) in
+            self.patches.iter().zip(counts.into_iter().zip(&self.has_outlets))
+        {
+            if matches!(patch.condition, Condition::Pressure(_)) && count > 0.0 && !has_outlets {
+                return Err(SolverError::Outlet { patch: patch.name.clone() });
+            }
+        }
+        Ok(())
     }
 
     /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the

@@ -35,6 +35,14 @@ pub enum SolverError {
         /// The vertex.
         vertex: u32,
     },
+    /// An outlet that has no vertex of its own.
+    #[error(
+        "patch '{patch}': every vertex of it lies on a wall or on an inlet too, so that nothing gets out there; an outlet needs a finer mesh"
+    )]
+    Outlet {
+        /// The patch.
+        patch: String,
+    },
     /// An array for another number of vertices.
     #[error("{what}: {found} values for a mesh of {expected} vertices")]
     Length {

@@ -30,8 +30,9 @@
 //!
 //! - A uniform stream stays uniform to rounding, whatever the mesh does: all terms act on
 //!   differences of nodal values.
-//! - Mass: the flux of the velocity through the whole boundary is 0 to the tolerance of the
-//!   pressure solve, in every step, walls that move included. No pressure is prescribed strongly,
+//! - Mass: where there is an outlet, the flux of the velocity through the whole boundary is 0 to the
+//!   tolerance of the pressure solve, in every step, walls that move included. Without one, what the
+//!   mesh gains or loses in volume stretches the fluid ([`StepOutcome::stretch`]). No pressure is prescribed strongly,
 //!   so that the equation of continuity is tested with every shape function, those at the outlet
 //!   included. Within the domain it holds weakly.
 //! - The same bits whatever the number of threads. On several ranks the same bits each time; the

@@ -31,6 +31,9 @@ use crate::saved::{self, State, StateError};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
 
+/// By which part of its volume a fluid may be stretched before that is told.
+const STRETCH: f64 = 1e-6;
+
 /// The options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
@@ -376,7 +379,14 @@ impl Run {
                 self.worst.min_scaled_jacobian =
                     self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
+            let was_stretched = self.flow.stretch.abs() > STRETCH;
             self.flow.count(&outcome, &self.solver);
+            if self.flow.stretch.abs() > STRETCH && !was_stretched && self.communicator.rank() == 0 {
+                eprintln!(
+                    "flow: cycle {}: nothing can flow out or in, but the volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
+                    step.cycle, self.flow.stretch
+                );
+            }
             if self.has_history {
                 let (cycle, time, through) =
                     (self.solver.cycle(), self.solver.time(), Through::now(&self.solver));

@@ -70,6 +70,9 @@ pub struct FlowReport {
     /// relative to the most that flowed through it; where nothing does, to the greatest velocity
     /// times the area of the boundary.
     pub worst_imbalance: f64,
+    /// The part of its volume by which the fluid was stretched in all, or compressed where it is
+    /// negative, since nothing lets it in or out: 0 with an outlet.
+    pub stretch: f64,
     /// Mean pressure where the velocity is prescribed less that where the pressure is.
     pub pressure_drop: f64,
     /// The flux out through each feature.
@@ -146,6 +149,7 @@ impl FlowReport {
         let through: f64 = 0.5 * solver.fluxes().into_iter().map(f64::abs).sum::<f64>();
         self.most_through = self.most_through.max(through);
         self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs());
+        self.stretch += outcome.stretch;
         self.steps += 1;
         self.momentum_iterations += outcome.momentum.iterations as f64;
         self.pressure_iterations += outcome.pressure.iterations as f64;

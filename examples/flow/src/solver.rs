@@ -71,9 +71,13 @@ pub struct StepOutcome {
     /// The solve of the pressure equation; where the step began with an impulse, the iterations of
     /// its projections too.
     pub pressure: Outcome,
-    /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the
-    /// pressure solve.
+    /// The flux of the velocity out through the whole boundary; where there is an outlet, 0 up to the
+    /// tolerance of the pressure solve.
     pub imbalance: f64,
+    /// The part of its volume by which the fluid was stretched in this step, or compressed where it is
+    /// negative: without an outlet nothing makes up for what the mesh gains or loses, or for
+    /// prescribed velocities that bring in more or less than they take out. 0 with an outlet.
+    pub stretch: f64,
 }
 
 /// The flow on one mesh.
@@ -100,6 +104,8 @@ pub struct Solver {
     potential: Vec<f64>,
     mesh_velocity: Vec<Vector>,
     moving: bool,
+    /// How much volume the mesh has gained in the last step.
+    gain: f64,
     /// Whether the boundary values jump before the next step.
     jump: bool,
     /// The length of the last step.
@@ -150,6 +156,7 @@ impl Solver {
             .and_then(|()| Boundary::new(&topology, patches));
         let mut boundary = agreed(communicator, own)?;
         boundary.measure(&topology, &geometry, halo.communicator());
+        boundary.check_outlets(halo.communicator())?;
         let (vertices, rows) = (topology.vertex_count(), topology.rows());
         let projection =
             Projection::new(&topology, &geometry, &boundary, &halo, settings.iteration_limit);
@@ -166,6 +173,7 @@ impl Solver {
             potential: vec![0.0; vertices],
             mesh_velocity: vec![[0.0; 3]; vertices],
             moving: false,
+            gain: 0.0,
             jump: true,
             last_step: 0.0,
             momentum: topology.zeros.clone(),
@@ -269,7 +277,8 @@ impl Solver {
         self.cycle += 1;
         self.time = end;
         self.check_finite()?;
-        Ok(StepOutcome { momentum, pressure, imbalance: self.imbalance() })
+        let (imbalance, stretch) = (self.imbalance(), self.stretch(time_step));
+        Ok(StepOutcome { momentum, pressure, imbalance, stretch })
     }
 
     /// Projects the velocity onto its new boundary values. The projection is approximate where the
@@ -289,6 +298,7 @@ impl Solver {
 
     /// Puts the mesh where it is at the end of the step; whether it moved.
     fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
+        self.gain = 0.0;
         let Some(motion) = motion else {
             if self.moving {
                 self.mesh_velocity.fill([0.0; 3]);
@@ -306,7 +316,9 @@ impl Solver {
         if !self.halo.communicator().any(moves) {
             return Ok(false);
         }
+        let before = self.volume();
         self.geometry = geometry;
+        self.gain = self.volume() - before;
         self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
         let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
         agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;

@@ -510,6 +510,37 @@ fn refuses_what_it_cannot_solve() {
     }
 }
 
+/// Without an outlet a mesh that loses volume compresses the fluid, and the outcome says so; an
+/// outlet that lies on walls with all of its vertices is none.
+#[test]
+fn says_where_nothing_can_get_out() {
+    let mesh = box_of_tets([8, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
+    let closed = sides(&mesh, std::array::from_fn(|_| Condition::NoSlip));
+    let mut solver =
+        Solver::new(&mesh, &Halo::none(), closed, WATERY, Settings::default()).unwrap();
+    assert_eq!(solver.step(0.1, None).unwrap().stretch, 0.0);
+    let flat: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, 0.98 * y, z]).collect();
+    let outcome = solver.step(0.1, Some(Motion { points: &flat })).unwrap();
+    assert!((outcome.stretch + 0.02 / 0.98).abs() < 1e-9, "{outcome:?}");
+
+    let thin = box_of_tets([8, 1, 1], [0.0; 3], [2.0, 0.1, 0.1]);
+    let conditions = [
+        uniform([1.0, 0.0, 0.0]),
+        outlet(),
+        Condition::NoSlip,
+        Condition::NoSlip,
+        Condition::NoSlip,
+        Condition::NoSlip,
+    ];
+    let patches = sides(&thin, conditions);
+    let refused = Solver::new(&thin, &Halo::none(), patches, WATERY, Settings::default());
+    assert!(
+        matches!(&refused, Err(SolverError::Outlet { patch }) if *patch == BOX_FEATURES[1]),
+        "{:?}",
+        refused.err()
+    );
+}
+
 /// Parts on several ranks make the same equations as the whole: solved well, the same flow. Through
 /// an outlet, past walls of each kind, while all of the mesh moves; and in a closed box that is
 /// squeezed without losing volume.
