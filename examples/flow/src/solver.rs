@@ -316,9 +316,9 @@ impl Solver {
         if !self.halo.communicator().any(moves) {
             return Ok(false);
         }
-        let before = self.volume();
+        let before = (!self.boundary.is_open()).then(|| self.volume());
         self.geometry = geometry;
-        self.gain = self.volume() - before;
+        self.gain = before.map_or(0.0, |before| self.volume() - before);
         self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
         let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
         agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;
