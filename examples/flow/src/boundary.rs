@@ -148,8 +148,8 @@ pub(crate) struct OutletVertex {
 /// where the pressure equation is the stiffer one.
 const OUTLET_STIFFNESS: f64 = 5.0;
 
-/// A vertex that no fluid passes through the wall at: one on a frictionless wall, or one where an
-/// inlet meets a no-slip wall.
+/// A direction in which a vertex moves with the wall: of one on a frictionless wall, or of one where
+/// an inlet meets a wall. Those of one vertex are perpendicular.
 #[derive(Debug, Clone, Copy)]
 struct SlipVertex {
     vertex: u32,
@@ -238,7 +238,8 @@ impl Boundary {
         let mut areas = vec![[0.0; 3]; points.len()];
         // Area and volume of each patch's outlet vertices.
         let mut sizes = vec![0.0; 2 * self.patches.len()];
-        self.measure_rims(points, &mut areas, topology.rows());
+        let mut walls = Vec::new();
+        self.measure_rims(points, &mut areas, topology.rows(), &mut walls);
         for (index, patch) in self.patches.iter().enumerate() {
             if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
                 continue;
@@ -263,18 +264,13 @@ impl Boundary {
             };
             for &vertex in vertices.iter().filter(|&&vertex| is_free(vertex)) {
                 let area = areas[vertex as usize];
-                let size = length(area);
-                if size == 0.0 {
+                if length(area) == 0.0 {
                     continue;
                 }
                 if let Condition::Pressure(_) = patch.condition {
                     self.outlets.push(OutletVertex { vertex, patch: index, area, yield_rate: 0.0 });
                 } else {
-                    let normal = area.map(|value| value / size);
-                    if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
-                        self.held[vertex as usize][axis] = true;
-                    }
-                    self.slip.push(SlipVertex { vertex, normal });
+                    walls.push((vertex, area));
                 }
             }
             for outlet in &self.outlets[first_outlet..] {
@@ -282,6 +278,7 @@ impl Boundary {
                 sizes[2 * index + 1] += geometry.vertex_volumes[outlet.vertex as usize];
             }
         }
+        self.hold(walls);
         communicator.reduce(Reduction::Sum, &mut sizes);
         self.has_outlets = sizes.chunks(2).map(|size| size[0] > 0.0).collect();
         for outlet in &mut self.outlets {
@@ -290,17 +287,23 @@ impl Boundary {
         }
     }
 
-    /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what
-    /// flows in then flows out, also where a wall slopes away from the inlet. `areas` is memory,
-    /// zero before and after.
-    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], rows: usize) {
+    /// Where a prescribed velocity meets walls, it rules, but not through the walls: what flows in then
+    /// flows out, also where a wall slopes away from the inlet. What each wall has there goes to
+    /// `walls`; `areas` is memory, zero before and after.
+    fn measure_rims(
+        &self,
+        points: &[Vector],
+        areas: &mut [Vector],
+        rows: usize,
+        walls: &mut Vec<(u32, Vector)>,
+    ) {
         let is_rim = |vertex: u32| {
             (vertex as usize) < rows && matches!(self.rules[vertex as usize], Rule::Prescribed(_))
         };
-        let mut rims = Vec::new();
-        for patch in
-            self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip))
-        {
+        let is_wall =
+            |patch: &&Patch| matches!(patch.condition, Condition::NoSlip | Condition::Slip);
+        for patch in self.patches.iter().filter(is_wall) {
+            let mut rims = Vec::new();
             for triangle in patch
                 .triangles
                 .iter()
@@ -314,14 +317,26 @@ impl Boundary {
                     }
                 }
             }
+            rims.sort_unstable();
+            rims.dedup();
+            walls.extend(
+                rims.into_iter().map(|vertex| (vertex, std::mem::take(&mut areas[vertex as usize]))),
+            );
         }
-        rims.sort_unstable();
-        rims.dedup();
-        for vertex in rims {
-            let area = std::mem::take(&mut areas[vertex as usize]);
-            let size = length(area);
-            if size > 0.0 {
-                self.slip.push(SlipVertex { vertex, normal: area.map(|value| value / size) });
+    }
+
+    /// Takes the directions that walls hold the vertices in from what each wall has of them.
+    fn hold(&mut self, mut walls: Vec<(u32, Vector)>) {
+        walls.sort_by_key(|(vertex, _)| *vertex);
+        for around in walls.chunk_by(|(one, _), (other, _)| one == other) {
+            let vertex = around[0].0;
+            for normal in normals(around.iter().map(|(_, area)| *area)) {
+                if self.rules[vertex as usize] == Rule::Free
+                    && let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12)
+                {
+                    self.held[vertex as usize][axis] = true;
+                }
+                self.slip.push(SlipVertex { vertex, normal });
             }
         }
     }
@@ -480,6 +495,36 @@ impl Boundary {
     fn counted_triangles(&self) -> impl Iterator<Item = &[[u32; 3]]> {
         self.patches.iter().zip(&self.counted).map(|(patch, &counted)| &patch.triangles[..counted])
     }
+}
+
+/// Walls that meet at less than this angle are one at a vertex: its cosine.
+const ONE_WALL: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// The perpendicular directions in which the walls at a vertex hold it, from the area that it has of
+/// each. Of walls that meet at a blunt edge it is the sum that lets nothing pass: a stream along one
+/// of them and then along the other crosses neither.
+fn normals(areas: impl Iterator<Item = Vector>) -> Vec<Vector> {
+    let mut walls: Vec<Vector> = Vec::new();
+    for area in areas {
+        let is_one = |wall: &&mut Vector| dot(**wall, area) > ONE_WALL * length(**wall) * length(area);
+        match walls.iter_mut().find(is_one) {
+            Some(wall) => *wall = std::array::from_fn(|axis| wall[axis] + area[axis]),
+            None => walls.push(area),
+        }
+    }
+    let mut normals: Vec<Vector> = Vec::new();
+    for wall in walls {
+        let mut rest = wall;
+        for normal in &normals {
+            let along = dot(rest, *normal);
+            rest = std::array::from_fn(|axis| rest[axis] - along * normal[axis]);
+        }
+        let size = length(rest);
+        if size > 1e-6 * length(wall) {
+            normals.push(rest.map(|value| value / size));
+        }
+    }
+    normals
 }
 
 /// The outward normal of a triangle, as long as its area.

@@ -510,6 +510,39 @@ fn refuses_what_it_cannot_solve() {
     }
 }
 
+/// Frictionless walls let nothing through, neither where two of them meet at an angle nor where one
+/// slopes away from an inlet.
+#[test]
+fn frictionless_walls_let_nothing_through() {
+    let mesh = box_of_tets([16, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
+    for start in [1.0, 0.0] {
+        let slope = |&[x, y, z]: &Vector| [x, y, z * (1.0 + 0.3 * f64::max(0.0, x - start))];
+        let mesh = mesh.with_points(mesh.points().iter().map(slope).collect()).unwrap();
+        let slip = || Condition::Slip;
+        let conditions = [uniform([1.0, 0.0, 0.0]), outlet(), slip(), slip(), slip(), slip()];
+        let mut patches = sides(&mesh, conditions);
+        // The upper side in two: before and behind the kink.
+        let mut upper = patches.pop().unwrap();
+        let is_before = |triangle: &[u32; 3]| {
+            triangle.iter().all(|&vertex| mesh.points()[vertex as usize][0] < 1.0 + 1e-9)
+        };
+        let (before, behind) = upper.triangles.iter().copied().partition(is_before);
+        upper.triangles = before;
+        patches.push(upper.clone());
+        upper.triangles = behind;
+        patches.push(upper);
+        let mut solver =
+            Solver::new(&mesh, &Halo::none(), patches, WATERY, Settings::default()).unwrap();
+        for _ in 0..40 {
+            solver.step(0.05, None).unwrap();
+        }
+        let fluxes = solver.fluxes();
+        let through = (fluxes[5] + fluxes[6]).abs();
+        assert!(through < 1e-12 && fluxes[0] < -0.9, "{start}: {fluxes:?}");
+        assert!((fluxes[0] + fluxes[1]).abs() < 1e-5, "{start}: {fluxes:?}");
+    }
+}
+
 /// Without an outlet a mesh that loses volume compresses the fluid, and the outcome says so; an
 /// outlet that lies on walls with all of its vertices is none.
 #[test]
