@@ -16,7 +16,7 @@ use tombolo::pipelines::language::Listen;
 use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
-use tombolo_flow::ranks::agreed;
+use tombolo_flow::ranks::{agreed, threads};
 use tombolo_flow::report::make_file;
 
 /// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser,
@@ -67,7 +67,7 @@ struct Arguments {
     /// Go on from a state that was saved, with the same case on as many ranks
     #[arg(long, value_name = "FILE")]
     restart: Option<PathBuf>,
-    /// How many threads each rank uses; without it the cores are shared out evenly
+    /// How many threads each rank uses; without it the cores that it may run on are shared out evenly
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Leave this rank without any of the mesh (to test what must work on any partition)
@@ -183,9 +183,7 @@ fn run(
     solvers: Arc<dyn Solvers>,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let is_first = ranks.rank() == 0;
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads =
-        arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
+    let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| threads(&*ranks)));
     if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }

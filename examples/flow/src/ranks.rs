@@ -27,3 +27,43 @@ pub fn agreed<T, E: ToString + From<RankError>>(
 ) -> Result<T, E> {
     if communicator.size() == 1 { mine } else { Ok(agree(communicator, mine)?) }
 }
+
+/// How many threads this rank uses that is not told otherwise: the cores that it may run on, shared
+/// out evenly among the ranks that may run on the same. Collective.
+#[must_use]
+pub fn threads(communicator: &dyn Communicator) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut counts: Vec<u8> = communicator
+        .gather(0, &place())
+        .map_or(Vec::new(), |places| sharers(&places))
+        .into_iter()
+        .flat_map(|count| (count as u64).to_le_bytes())
+        .collect();
+    communicator.broadcast(0, &mut counts);
+    let count = counts.as_chunks().0.get(communicator.rank()).copied().map(u64::from_le_bytes);
+    let count = count.and_then(|count| usize::try_from(count).ok()).unwrap_or(1);
+    (cores / count.max(1)).max(1)
+}
+
+/// For each rank how many run where it does, by the places of all.
+///
+/// ```
+/// use tombolo_flow::ranks::sharers;
+///
+/// // Two that are bound to cores of their own, and two that are not, on another machine.
+/// let places = ["one 0-7", "one 8-15", "two 0-15", "two 0-15"];
+/// assert_eq!(sharers(&places), [1, 1, 2, 2]);
+/// ```
+#[must_use]
+pub fn sharers<P: PartialEq>(places: &[P]) -> Vec<usize> {
+    let alike = |place: &P| places.iter().filter(|other| *other == place).count();
+    places.iter().map(alike).collect()
+}
+
+/// The machine and those of its cores that this process may run on; nothing where that is not known.
+fn place() -> Vec<u8> {
+    let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
+    let status = read("/proc/self/status");
+    let cores = status.lines().find(|line| line.starts_with("Cpus_allowed_list"));
+    (read("/proc/sys/kernel/hostname") + cores.unwrap_or_default()).into_bytes()
+}
