@@ -115,6 +115,7 @@ fn stop_on_signals(stopper: Stopper) -> std::io::Result<()> {
 }
 
 /// Whether this process was started by mpirun, together with others or alone.
+#[cfg(feature = "distributed")]
 fn under_mpirun() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"]
         .into_iter()
@@ -151,12 +152,20 @@ fn on_ranks(
     })
 }
 
+/// Whether this process was started together with others, which would write the same files.
+#[cfg(not(feature = "distributed"))]
+fn is_one_of_several() -> bool {
+    let said = |name: &str| std::env::var(name).ok();
+    let size = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"].into_iter().find_map(said);
+    // What starts processes by PMIx does not say how many there are.
+    size.is_some_and(|size| size != "1") || said("PMIX_RANK").is_some_and(|rank| rank != "0")
+}
+
 #[cfg(not(feature = "distributed"))]
 fn on_ranks(
     work: impl FnOnce(Ranks, Arc<dyn Solvers>) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<(), String> {
-    let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
-    if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
+    if is_one_of_several() {
         return Err(
             "started on several ranks, but built for one process; build it with `--features distributed`".into()
         );

@@ -1,6 +1,8 @@
 //! One time step after the other.
 
+mod checks;
 mod measures;
+mod motion;
 mod parameters;
 mod projection;
 mod saved;
@@ -18,6 +20,7 @@ use crate::linear::{BiCgStab, BlockIncompleteLu, Outcome, for_each, sum};
 use crate::momentum::{self, ElementState, Known};
 use crate::ranks::{agreed, total};
 use crate::topology::Topology;
+use checks::check_elements;
 use projection::{Projection, Start};
 
 /// How much of the energy that flows in at an outlet is damped; one half makes the energy of the
@@ -296,50 +299,6 @@ impl Solver {
         total
     }
 
-    /// Puts the mesh where it is at the end of the step; whether it moved.
-    fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
-        self.gain = 0.0;
-        let Some(motion) = motion else {
-            if self.moving {
-                self.mesh_velocity.fill([0.0; 3]);
-            }
-            return Ok(false);
-        };
-        let geometry = agreed(self.halo.communicator(), self.moved(motion))?;
-        let mut moves = false;
-        for (velocity, (new, old)) in
-            self.mesh_velocity.iter_mut().zip(geometry.points.iter().zip(&self.geometry.points))
-        {
-            *velocity = std::array::from_fn(|axis| (new[axis] - old[axis]) / time_step);
-            moves |= *velocity != [0.0; 3];
-        }
-        if !self.halo.communicator().any(moves) {
-            return Ok(false);
-        }
-        let before = (!self.boundary.is_open()).then(|| self.volume());
-        self.geometry = geometry;
-        self.gain = before.map_or(0.0, |before| self.volume() - before);
-        self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
-        let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
-        agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;
-        Ok(true)
-    }
-
-    /// The shape of the mesh at the end of a motion.
-    fn moved(&self, motion: Motion) -> Result<Geometry, SolverError> {
-        let vertices = self.topology.vertex_count();
-        if motion.points.len() != vertices {
-            return Err(SolverError::Length {
-                what: "coordinates",
-                found: motion.points.len(),
-                expected: vertices,
-            });
-        }
-        let geometry = Geometry::new(&self.topology, self.topology.to_solver(motion.points));
-        check_elements(&self.topology, &geometry, self.cycle)?;
-        Ok(geometry)
-    }
-
     /// Prepares the known part of the time derivative, the convecting velocity and the first guess
     /// (in `scratch`); the rate. Nodal values travel with the mesh, so that they are extrapolated
     /// while it moves too, by `growth`: the length of the step in lengths of the last, 0 where nothing
@@ -533,52 +492,4 @@ impl Solver {
         let [integral, whole] = total(self.halo.communicator(), sums);
         self.pressure.iter_mut().for_each(|value| *value -= integral / whole);
     }
-
-    fn check_finite(&self) -> Result<(), SolverError> {
-        let (velocity, pressure) = (&self.velocity, &self.pressure);
-        let zero = sum(pressure.len(), |range| {
-            [range
-                .map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0)
-                .sum()]
-        });
-        if total(self.halo.communicator(), zero) == [0.0] {
-            return Ok(());
-        }
-        agreed(self.halo.communicator(), self.first_non_finite())
-    }
-
-    fn first_non_finite(&self) -> Result<(), SolverError> {
-        for (rank, &vertex) in self.topology.vertex_order.iter().enumerate() {
-            let values = [
-                self.velocity[rank][0],
-                self.velocity[rank][1],
-                self.velocity[rank][2],
-                self.pressure[rank],
-            ];
-            if let Some(component) = values.iter().position(|value| !value.is_finite()) {
-                return Err(SolverError::Diverged {
-                    cycle: self.cycle,
-                    time: self.time,
-                    quantity: if component < 3 { "velocity" } else { "pressure" },
-                    vertex: vertex as usize,
-                    position: self.geometry.points[rank],
-                    value: values[component],
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Result<(), SolverError> {
-    let Some(element) = geometry.inverted() else { return Ok(()) };
-    let corners = topology.elements[element].map(|vertex| geometry.points[vertex as usize]);
-    Err(SolverError::Inverted {
-        cycle,
-        cell: topology.element_order[element] as usize,
-        position: std::array::from_fn(|axis| {
-            0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()
-        }),
-        volume: geometry.elements[element].volume,
-    })
 }

@@ -506,6 +506,25 @@ fn a_history_goes_on_where_the_run_does() {
 }
 
 #[test]
+#[cfg(not(feature = "distributed"))]
+fn processes_that_do_not_know_of_each_other_are_refused() {
+    let (_folder, case) = folder(CASE);
+    let started_by = |name: &str, value: &str| {
+        let mut flow = std::process::Command::new(env!("CARGO_BIN_EXE_flow"));
+        flow.arg("--case").arg(&case).args(["--headless", "--steps", "1"]);
+        for other in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS", "PMIX_RANK"] {
+            flow.env_remove(other);
+        }
+        let output = flow.env(name, value).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).contains("started on several ranks");
+        assert!(output.status.success() != told, "{output:?}");
+        told
+    };
+    assert!(started_by("PMIX_RANK", "1") && started_by("SLURM_STEP_NUM_TASKS", "2"));
+    assert!(!started_by("PMIX_RANK", "0") && !started_by("OMPI_COMM_WORLD_SIZE", "1"));
+}
+
+#[test]
 fn the_state_at_the_end_is_saved_too() {
     let (folder, case) = folder(CASE);
     let state = folder.path().join("flow.state");
