@@ -33,31 +33,25 @@ pub fn agreed<T, E: ToString + From<RankError>>(
 #[must_use]
 pub fn threads(communicator: &dyn Communicator) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut counts: Vec<u8> = communicator
-        .gather(0, &place())
-        .map_or(Vec::new(), |places| sharers(&places))
-        .into_iter()
-        .flat_map(|count| (count as u64).to_le_bytes())
-        .collect();
-    communicator.broadcast(0, &mut counts);
-    let count = counts.as_chunks().0.get(communicator.rank()).copied().map(u64::from_le_bytes);
-    let count = count.and_then(|count| usize::try_from(count).ok()).unwrap_or(1);
-    (cores / count.max(1)).max(1)
+    let own = place();
+    share_of(cores, &own, &communicator.gather_all(&own))
 }
 
-/// For each rank how many run where it does, by the places of all.
+/// The share of the cores at a place of ranks, where ranks are at all these places.
 ///
 /// ```
-/// use tombolo_flow::ranks::sharers;
+/// use tombolo_flow::ranks::share_of;
 ///
 /// // Two that are bound to cores of their own, and two that are not, on another machine.
 /// let places = ["one 0-7", "one 8-15", "two 0-15", "two 0-15"];
-/// assert_eq!(sharers(&places), [1, 1, 2, 2]);
+/// assert_eq!(share_of(8, &places[0], &places), 8);
+/// assert_eq!(share_of(16, &places[2], &places), 8);
+/// assert_eq!(share_of(1, &places[3], &places), 1);
 /// ```
 #[must_use]
-pub fn sharers<P: PartialEq>(places: &[P]) -> Vec<usize> {
-    let alike = |place: &P| places.iter().filter(|other| *other == place).count();
-    places.iter().map(alike).collect()
+pub fn share_of<P: PartialEq>(cores: usize, place: &P, places: &[P]) -> usize {
+    let sharers = places.iter().filter(|other| *other == place).count();
+    (cores / sharers.max(1)).max(1)
 }
 
 /// The machine and those of its cores that this process may run on; nothing where that is not known.
