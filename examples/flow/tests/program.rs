@@ -535,8 +535,15 @@ fn the_state_at_the_end_is_saved_too() {
     };
     assert_eq!(run(&saving).cycles, 7);
     // As many steps have been done before this one begins.
-    let report = run(&Options { steps: Some(1), restart: Some(state), ..headless(&case) });
+    let again = Options { steps: Some(1), restart: Some(state.clone()), ..headless(&case) };
+    let report = run(&again);
     assert_eq!((report.cycles, report.error.as_deref()), (7, None));
+    // Among the coordinates.
+    let mut damaged = std::fs::read(&state).unwrap();
+    damaged[1000] ^= 4;
+    std::fs::write(&state, damaged).unwrap();
+    let refused = Run::new(&again).err().unwrap().to_string();
+    assert!(refused.contains("flow.state") && refused.contains("damaged"), "{refused}");
 }
 
 #[test]

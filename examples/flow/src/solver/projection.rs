@@ -108,19 +108,21 @@ impl Projection {
     }
 
     /// Writes down what is not in the matrix.
-    pub(super) fn save(&self, writer: &mut Writer) {
+    pub(super) fn save(&self, writer: &mut Writer, topology: &Topology) {
         writer.u8(self.is_stale.into());
         writer.u8(self.is_worn.into());
         self.usual_iterations.iter().for_each(|&usual| writer.u64(usual as u64));
         writer.u8(self.set_up_at.is_some().into());
-        self.set_up_at.iter().for_each(|points| writer.f64s(points.as_flattened()));
+        if let Some(points) = &self.set_up_at {
+            writer.f64s(topology.to_mesh(points).as_flattened());
+        }
     }
 
     /// Reads what was written down; where the mesh lay when the preconditioner was set up.
     pub(super) fn read(
         &mut self,
         reader: &mut Reader<'_>,
-        vertices: usize,
+        topology: &Topology,
     ) -> Result<Option<Vec<Vector>>, Garbled> {
         (self.is_stale, self.is_worn) = (reader.u8()? != 0, reader.u8()? != 0);
         for usual in &mut self.usual_iterations {
@@ -128,7 +130,10 @@ impl Projection {
         }
         self.set_up_at = match reader.u8()? {
             0 => None,
-            _ => Some(reader.f64s(3 * vertices)?.as_chunks().0.to_vec()),
+            _ => {
+                let points = reader.f64s(3 * topology.vertex_count())?;
+                Some(topology.to_solver(points.as_chunks().0))
+            }
         };
         Ok(self.set_up_at.clone())
     }
