@@ -112,7 +112,10 @@ impl History {
         let seconds = self.seconds + seconds;
         self.begin()
             .and_then(|lines| {
-                writeln!(lines, "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}")?;
+                writeln!(
+                    lines,
+                    "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}"
+                )?;
                 // A run may be watched through it, and may be ended by force.
                 lines.flush()
             })

@@ -381,7 +381,8 @@ impl Run {
             }
             let was_stretched = self.flow.stretch.abs() > STRETCH;
             self.flow.count(&outcome, &self.solver);
-            if self.flow.stretch.abs() > STRETCH && !was_stretched && self.communicator.rank() == 0 {
+            if self.flow.stretch.abs() > STRETCH && !was_stretched && self.communicator.rank() == 0
+            {
                 eprintln!(
                     "flow: cycle {}: nothing can flow out or in, but the volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
                     step.cycle, self.flow.stretch

@@ -436,7 +436,8 @@ fn a_replay_does_not_read_the_orders_of_the_case() {
     ));
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("orders.json"), ORDERS).unwrap();
-    std::fs::write(at("pipelines.json"), r#"{ "version": 1, "journal": "journal.jsonl" }"#).unwrap();
+    std::fs::write(at("pipelines.json"), r#"{ "version": 1, "journal": "journal.jsonl" }"#)
+        .unwrap();
     let applied = |options: Options| {
         let report = run(&options);
         let json = serde_json::to_value(&report.orders).unwrap();
@@ -486,8 +487,7 @@ fn a_history_goes_on_where_the_run_does() {
     let table = std::fs::read_to_string(at("history.csv")).unwrap();
     std::fs::write(at("history.csv"), format!("{table}8,0.4,0,0,0,99\n1")).unwrap();
     let torn = std::fs::read_to_string(at("history.csv")).unwrap();
-    let further =
-        Options { steps: Some(12), restart: Some(at("flow.state")), ..saving.clone() };
+    let further = Options { steps: Some(12), restart: Some(at("flow.state")), ..saving.clone() };
     drop(Run::new(&further).unwrap());
     assert_eq!(std::fs::read_to_string(at("history.csv")).unwrap(), torn);
     run(&further);

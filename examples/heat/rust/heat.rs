@@ -61,15 +61,18 @@ fn conduct(
     // Explicit steps are stable up to a length that the smallest tetrahedron and the fastest vertex
     // set: a step is taken in as many parts as that needs.
     let square = |vector: &[f64; 3]| dot(*vector, *vector);
-    let smallest =
-        elements.iter().map(|(_, gradients)| gradients.iter().map(square).sum()).fold(0.0, f64::max);
+    let smallest = elements
+        .iter()
+        .map(|(_, gradients)| gradients.iter().map(square).sum())
+        .fold(0.0, f64::max);
     let fastest = velocity.iter().map(square).fold(0.0, f64::max);
     let parts = (time_step * (2.0 * smallest + 0.5 * fastest)).ceil().max(1.0);
     for _ in 0..parts as usize {
         let (mut flux, mut capacity) = (vec![0.0; points.len()], vec![0.0; points.len()]);
         for (tet, (volume, gradients)) in tets.iter().zip(&elements) {
             let tet = tet.map(|vertex| vertex as usize);
-            let slope = [0, 1, 2].map(|k| (0..4).map(|i| temperature[tet[i]] * gradients[i][k]).sum());
+            let slope =
+                [0, 1, 2].map(|k| (0..4).map(|i| temperature[tet[i]] * gradients[i][k]).sum());
             // A vertex that moves passes through the temperature: the term of the moving mesh.
             let along: f64 = tet.iter().map(|&vertex| 0.25 * dot(velocity[vertex], slope)).sum();
             for (vertex, own) in tet.into_iter().zip(gradients) {

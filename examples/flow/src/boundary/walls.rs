@@ -39,7 +39,8 @@ impl Boundary {
             rims.sort_unstable();
             rims.dedup();
             walls.extend(
-                rims.into_iter().map(|vertex| (vertex, std::mem::take(&mut areas[vertex as usize]))),
+                rims.into_iter()
+                    .map(|vertex| (vertex, std::mem::take(&mut areas[vertex as usize]))),
             );
         }
     }
@@ -70,7 +71,8 @@ const ONE_WALL: f64 = std::f64::consts::FRAC_1_SQRT_2;
 fn normals(areas: impl Iterator<Item = Vector>) -> Vec<Vector> {
     let mut walls: Vec<Vector> = Vec::new();
     for area in areas {
-        let is_one = |wall: &&mut Vector| dot(**wall, area) > ONE_WALL * length(**wall) * length(area);
+        let is_one =
+            |wall: &&mut Vector| dot(**wall, area) > ONE_WALL * length(**wall) * length(area);
         match walls.iter_mut().find(is_one) {
             Some(wall) => *wall = std::array::from_fn(|axis| wall[axis] + area[axis]),
             None => walls.push(area),

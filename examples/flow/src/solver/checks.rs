@@ -46,7 +46,11 @@ impl Solver {
 }
 
 /// Refuses a mesh with an inverted or flat element.
-pub(super) fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Result<(), SolverError> {
+pub(super) fn check_elements(
+    topology: &Topology,
+    geometry: &Geometry,
+    cycle: u64,
+) -> Result<(), SolverError> {
     let Some(element) = geometry.inverted() else { return Ok(()) };
     let corners = topology.elements[element].map(|vertex| geometry.points[vertex as usize]);
     Err(SolverError::Inverted {

@@ -8,7 +8,11 @@ use crate::ranks::agreed;
 
 impl Solver {
     /// Puts the mesh where it is at the end of the step; whether it moved.
-    pub(super) fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
+    pub(super) fn move_mesh(
+        &mut self,
+        time_step: f64,
+        motion: Option<Motion>,
+    ) -> Result<bool, SolverError> {
         self.gain = 0.0;
         let Some(motion) = motion else {
             if self.moving {
