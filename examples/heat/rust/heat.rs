@@ -63,7 +63,7 @@ fn conduct(
     let square = |vector: &[f64; 3]| dot(*vector, *vector);
     let smallest = elements
         .iter()
-        .map(|(_, gradients)| gradients.iter().map(square).sum())
+        .map(|(_, gradients)| gradients.iter().map(square).sum::<f64>())
         .fold(0.0, f64::max);
     let fastest = velocity.iter().map(square).fold(0.0, f64::max);
     let parts = (time_step * (2.0 * smallest + 0.5 * fastest)).ceil().max(1.0);
