@@ -75,10 +75,11 @@ fn a_report_that_cannot_be_written_is_told_before_the_run() {
     let small = Small::new();
     let mut arguments = small.arguments(&["--headless", "--steps", "100000"]);
     let report = arguments.iter().position(|argument| argument == "--report").expect("a report");
-    arguments[report + 1] = small.path("no/such/folder/report.json").display().to_string();
+    // A file where a folder should be.
+    arguments[report + 1] = small.path("case.json/report.json").display().to_string();
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(!status.success());
-    assert!(text.contains("no/such/folder/report.json"), "{text}");
+    assert!(text.contains("case.json/report.json"), "{text}");
 }
 
 #[test]

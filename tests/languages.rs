@@ -149,6 +149,22 @@ fn three_ranks_and_ranks_without_cells_compute_what_one_does() {
     }
 }
 
+/// A finer mesh and a better conductor take shorter steps: no temperature leaves the range of those
+/// that are held.
+#[test]
+fn fine_meshes_stay_finite() {
+    let built = Built::get();
+    let change = json!([{"at": {"cycle": 0}, "parameter": {"name": "conductivity", "value": 1}}]);
+    let (_directory, pipelines, change) = inputs(&json!({"version": 1}), &change);
+    for name in PROGRAMS {
+        let mut program = built.program(name, 2);
+        program.args(["150", "16"]).env("TOMBOLO_PIPELINES", &pipelines);
+        let told = numbers(&succeed(program.env("TOMBOLO_ORDERS", &change)));
+        // On its way to one half.
+        assert!((told[1] - 0.408).abs() < 0.01, "{name}: {told:?}");
+    }
+}
+
 #[test]
 fn ranks_without_a_configuration_find_a_port() {
     let built = Built::get();

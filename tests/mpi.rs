@@ -68,6 +68,7 @@ type Dealing<'a> = (usize, &'a [&'a str]);
 /// The same case on one process and dealt out in each way: the orders take effect at the same
 /// cycles, the meshes and fields agree.
 fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
+    let common = &[common, &["--impulse-tolerance", "1e-6"]].concat()[..];
     let (status, text) = Run::flow(&small.arguments(common)).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let alone = small.read("report.json");
@@ -249,7 +250,8 @@ fn extracts_of_any_ranks_are_alike() {
             "schedule": {"steps": 2}}}]),
     );
     let arguments = ["--pipelines", "@pipelines.json", "--orders", "@orders.json"];
-    let arguments = small.arguments(&[&arguments[..], &["--headless", "--steps", "10"]].concat());
+    let ends = ["--headless", "--steps", "10", "--impulse-tolerance", "1e-6"];
+    let arguments = small.arguments(&[&arguments[..], &ends].concat());
     let (status, text) = Run::flow(&arguments).finish(PATIENCE);
     assert!(status.success(), "{text}");
     let files = || extracts.each_ref().map(|(file, _)| read(&small, &format!("out/{file}")));
@@ -342,6 +344,12 @@ fn ranks_give_up_together() {
     assert!(!status.success());
     assert_eq!(text.matches("flow: ").count(), 1, "{text}");
     assert!(text.contains("flow: rank ") && text.contains("diverged"), "{text}");
+    // What only the first rank finds out.
+    let mut arguments = small.arguments(&["--headless"]);
+    arguments.extend(["--report".to_owned(), small.path("case.json/r.json").display().to_string()]);
+    arguments.drain(4..6);
+    let (status, text) = Run::flow_on(3, &arguments).finish(PATIENCE);
+    assert!(!status.success() && text.contains("case.json/r.json"), "{text}");
     case["mesh"] = json!("nowhere.msh");
     small.write("case.json", &case);
     let (status, text) = Run::flow_on(3, &small.arguments(&["--headless"])).finish(PATIENCE);

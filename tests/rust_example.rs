@@ -19,8 +19,8 @@ fn the_box_is_heated_and_pressed() {
     std::fs::write(folder.path().join("pipelines.json"), config.to_string()).expect("a file");
     let mut program = Command::new(programs().join("examples/heat"));
     let told = succeed(program.current_dir(folder.path()).args(["pipelines.json", "9"]));
-    // Nine steps of a thousandth, in which the cold of the floor comes no further than nine layers
-    // of the twelve.
+    // Nine steps of a thousandth, in which the cold of the floor comes no further than to the
+    // middle.
     assert_eq!(told, "1 orders, warmest 0.009000\n");
     for (cycle, height) in [(0, 1.0), (4, 0.8), (8, 0.8)] {
         let file = folder.path().join(format!("solid-{cycle}.vtu"));
@@ -41,4 +41,22 @@ fn the_box_is_heated_and_pressed() {
             assert!(expected.contains(&value), "cycle {cycle}, {point:?}: {value}");
         }
     }
+}
+
+/// A box that is pressed to half of its height needs shorter steps, and takes them.
+#[test]
+fn a_box_that_is_pressed_flat_stays_finite() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [above, below] = [(0.99, 1), (0.01, -1)]
+        .map(|(z, up)| json!({"half_space": {"origin": [0, 0, z], "normal": [0, 0, up]}}));
+    let config = json!({"version": 1, "steering": {"background": false}, "pipelines": [
+        {"name": "press", "at": {"cycle": 2}, "stages": [
+            {"translate": {"region": above, "fixed_region": below, "by": [0, 0, -0.5]}},
+            {"order": {"schedule": {"steps": 20}}}]}]});
+    std::fs::write(folder.path().join("pipelines.json"), config.to_string()).expect("a file");
+    let mut program = Command::new(programs().join("examples/heat"));
+    let told = succeed(program.current_dir(folder.path()).args(["pipelines.json", "600"]));
+    let warmest = told.trim().strip_prefix("1 orders, warmest ").and_then(|it| it.parse().ok());
+    // Heated at 1, cold below and insulated above: half of the square of the height in the end.
+    assert!(warmest.is_some_and(|warmest: f64| (warmest - 0.125).abs() < 2e-3), "{told}");
 }

@@ -1,5 +1,7 @@
 //! What holds on the boundary: prescribed velocities, walls, outlets.
 
+mod walls;
+
 use std::fmt;
 use std::sync::Arc;
 
@@ -148,8 +150,8 @@ pub(crate) struct OutletVertex {
 /// where the pressure equation is the stiffer one.
 const OUTLET_STIFFNESS: f64 = 5.0;
 
-/// A vertex that no fluid passes through the wall at: one on a frictionless wall, or one where an
-/// inlet meets a no-slip wall.
+/// A direction in which a vertex moves with the wall: of one on a frictionless wall, or of one where
+/// an inlet meets a wall. Those of one vertex are perpendicular.
 #[derive(Debug, Clone, Copy)]
 struct SlipVertex {
     vertex: u32,
@@ -165,8 +167,8 @@ pub(crate) struct Boundary {
     pub held: Vec<[bool; 3]>,
     /// The outlet vertices that this rank owns.
     pub outlets: Vec<OutletVertex>,
-    /// Whether any rank has one.
-    open: bool,
+    /// For each patch whether any rank has one there.
+    has_outlets: Vec<bool>,
     /// For each patch how many of its triangles are counted on this rank: they are the first.
     counted: Vec<usize>,
     slip: Vec<SlipVertex>,
@@ -218,7 +220,7 @@ impl Boundary {
             rules,
             held,
             outlets: Vec::new(),
-            open: false,
+            has_outlets: Vec::new(),
             counted,
             slip: Vec::new(),
         })
@@ -238,7 +240,8 @@ impl Boundary {
         let mut areas = vec![[0.0; 3]; points.len()];
         // Area and volume of each patch's outlet vertices.
         let mut sizes = vec![0.0; 2 * self.patches.len()];
-        self.measure_rims(points, &mut areas, topology.rows());
+        let mut walls = Vec::new();
+        self.measure_rims(points, &mut areas, topology.rows(), &mut walls);
         for (index, patch) in self.patches.iter().enumerate() {
             if !matches!(patch.condition, Condition::Slip | Condition::Pressure(_)) {
                 continue;
@@ -263,18 +266,13 @@ impl Boundary {
             };
             for &vertex in vertices.iter().filter(|&&vertex| is_free(vertex)) {
                 let area = areas[vertex as usize];
-                let size = length(area);
-                if size == 0.0 {
+                if length(area) == 0.0 {
                     continue;
                 }
                 if let Condition::Pressure(_) = patch.condition {
                     self.outlets.push(OutletVertex { vertex, patch: index, area, yield_rate: 0.0 });
                 } else {
-                    let normal = area.map(|value| value / size);
-                    if let Some(axis) = (0..3).find(|&axis| normal[axis].abs() > 1.0 - 1e-12) {
-                        self.held[vertex as usize][axis] = true;
-                    }
-                    self.slip.push(SlipVertex { vertex, normal });
+                    walls.push((vertex, area));
                 }
             }
             for outlet in &self.outlets[first_outlet..] {
@@ -282,53 +280,33 @@ impl Boundary {
                 sizes[2 * index + 1] += geometry.vertex_volumes[outlet.vertex as usize];
             }
         }
+        self.hold(walls);
         communicator.reduce(Reduction::Sum, &mut sizes);
-        self.open = sizes.iter().any(|&size| size > 0.0);
+        self.has_outlets = sizes.chunks(2).map(|size| size[0] > 0.0).collect();
         for outlet in &mut self.outlets {
             let patch = 2 * outlet.patch;
             outlet.yield_rate = OUTLET_STIFFNESS * sizes[patch] / sizes[patch + 1];
         }
     }
 
-    /// Where a prescribed velocity meets no-slip walls, it rules, but not through the walls: what
-    /// flows in then flows out, also where a wall slopes away from the inlet. `areas` is memory,
-    /// zero before and after.
-    fn measure_rims(&mut self, points: &[Vector], areas: &mut [Vector], rows: usize) {
-        let is_rim = |vertex: u32| {
-            (vertex as usize) < rows && matches!(self.rules[vertex as usize], Rule::Prescribed(_))
-        };
-        let mut rims = Vec::new();
-        for patch in
-            self.patches.iter().filter(|patch| matches!(patch.condition, Condition::NoSlip))
-        {
-            for triangle in patch
-                .triangles
-                .iter()
-                .filter(|triangle| triangle.iter().any(|&vertex| is_rim(vertex)))
-            {
-                let area = triangle_area(points, *triangle);
-                for &vertex in triangle.iter().filter(|&&vertex| is_rim(vertex)) {
-                    rims.push(vertex);
-                    for axis in 0..3 {
-                        areas[vertex as usize][axis] += area[axis] / 3.0;
-                    }
-                }
-            }
-        }
-        rims.sort_unstable();
-        rims.dedup();
-        for vertex in rims {
-            let area = std::mem::take(&mut areas[vertex as usize]);
-            let size = length(area);
-            if size > 0.0 {
-                self.slip.push(SlipVertex { vertex, normal: area.map(|value| value / size) });
-            }
-        }
-    }
-
     /// Whether some part of the boundary lets the fluid choose how much of it passes.
     pub fn is_open(&self) -> bool {
-        self.open
+        self.has_outlets.contains(&true)
+    }
+
+    /// Refuses an outlet that walls and inlets leave no vertex of, so that nothing gets out there.
+    /// Collective.
+    pub fn check_outlets(&self, communicator: &dyn Communicator) -> Result<(), SolverError> {
+        let mut counts: Vec<f64> = self.counted.iter().map(|&counted| counted as f64).collect();
+        communicator.reduce(Reduction::Sum, &mut counts);
+        for (patch, (count, has_outlets)) in
+            self.patches.iter().zip(counts.into_iter().zip(&self.has_outlets))
+        {
+            if matches!(patch.condition, Condition::Pressure(_)) && count > 0.0 && !has_outlets {
+                return Err(SolverError::Outlet { patch: patch.name.clone() });
+            }
+        }
+        Ok(())
     }
 
     /// Writes the prescribed velocities into `velocity`, and takes the part through walls from the
@@ -354,6 +332,41 @@ impl Boundary {
             }
         }
         self.impose_slip(velocity, mesh_velocity);
+    }
+
+    /// Refuses values that are not finite.
+    pub fn check(
+        &self,
+        points: &[Vector],
+        time: f64,
+        parameters: &[f64],
+    ) -> Result<(), SolverError> {
+        let not_finite = |patch: usize, quantity: &'static str, vertex: usize, value: f64| {
+            Err(SolverError::NotFinite {
+                patch: self.patches[patch].name.clone(),
+                quantity,
+                position: points[vertex],
+                value,
+            })
+        };
+        for (vertex, rule) in self.rules.iter().enumerate() {
+            if let Rule::Prescribed(patch) = *rule
+                && let Condition::Velocity(values) = &self.patches[patch].condition
+            {
+                let place = Place { position: points[vertex], time, parameters };
+                let mut values = values.iter().map(|value| value.at(&place));
+                if let Some(value) = values.find(|value| !value.is_finite()) {
+                    return not_finite(patch, "velocity", vertex, value);
+                }
+            }
+        }
+        for outlet in &self.outlets {
+            let value = self.outlet_pressure(outlet, points, time, parameters);
+            if !value.is_finite() {
+                return not_finite(outlet.patch, "pressure", outlet.vertex as usize, value);
+            }
+        }
+        Ok(())
     }
 
     /// Takes the part of the velocity through walls, where it is not prescribed to be the wall's,

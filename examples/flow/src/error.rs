@@ -35,6 +35,14 @@ pub enum SolverError {
         /// The vertex.
         vertex: u32,
     },
+    /// An outlet that has no vertex of its own.
+    #[error(
+        "patch '{patch}': every vertex of it lies on a wall or on an inlet too, so that nothing gets out there; an outlet needs a finer mesh"
+    )]
+    Outlet {
+        /// The patch.
+        patch: String,
+    },
     /// An array for another number of vertices.
     #[error("{what}: {found} values for a mesh of {expected} vertices")]
     Length {
@@ -51,6 +59,18 @@ pub enum SolverError {
         /// The name of the number.
         what: &'static str,
         /// Its value.
+        value: f64,
+    },
+    /// A boundary value that is not finite.
+    #[error("the {quantity} on '{patch}' would be {value} at ({:.6}, {:.6}, {:.6}); it must be finite", position[0], position[1], position[2])]
+    NotFinite {
+        /// The patch.
+        patch: String,
+        /// Velocity or pressure.
+        quantity: &'static str,
+        /// Where.
+        position: Vector,
+        /// The value.
         value: f64,
     },
     /// A state that was saved of something else.

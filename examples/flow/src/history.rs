@@ -1,10 +1,13 @@
 //! The flow step by step, as a table.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use tombolo_pipelines::files::write_durably;
+
 use crate::Condition;
+use crate::folder::make_folder_of;
 use crate::solver::Solver;
 
 /// The flux through the domain, and the pressure that it takes.
@@ -47,38 +50,53 @@ impl Through {
     }
 }
 
-/// A file of comma-separated values that gets one line for each step.
+const HEADER: &str = "cycle,time,pressure_drop,mass_in,mass_out,seconds";
+
+/// A file of comma-separated values that gets one line for each step: the state at its end, and the
+/// seconds since the run began.
+///
+/// What is in the file stays there until the first step: a run that does not come so far has nothing
+/// to put in its place.
 #[derive(Debug)]
 pub(crate) struct History {
     file: PathBuf,
-    lines: BufWriter<File>,
+    /// What the file begins with, where it is a table that goes on.
+    before: Option<String>,
+    /// The seconds that it goes on from.
+    seconds: f64,
+    lines: Option<BufWriter<File>>,
 }
 
 impl History {
-    /// Creates the file, with the names of its columns: the state at the end of each step, and the
-    /// seconds since the run began.
-    pub(crate) fn create(file: &Path) -> Result<Self, (PathBuf, std::io::Error)> {
-        let failed = |error| (file.to_owned(), error);
-        let mut lines = BufWriter::new(File::create(file).map_err(failed)?);
-        writeln!(lines, "cycle,time,pressure_drop,mass_in,mass_out,seconds").map_err(failed)?;
-        Ok(Self { file: file.into(), lines })
+    /// A table of its own.
+    pub(crate) fn create(file: &Path) -> Result<Self, (PathBuf, io::Error)> {
+        // Whether there can be such a file is to be known before the run.
+        make_folder_of(file)
+            .and_then(|()| OpenOptions::new().create(true).append(true).open(file))
+            .map_err(|error| (file.to_owned(), error))?;
+        Ok(Self { file: file.into(), before: None, seconds: 0.0, lines: None })
     }
 
-    /// Goes on with the file of a run that is restarted: the lines of later steps are cut off.
-    pub(crate) fn resume(file: &Path, cycle: u64) -> Result<Self, (PathBuf, std::io::Error)> {
-        let before = match std::fs::read_to_string(file) {
-            Ok(before) => before,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+    /// Goes on with the table of a run that is restarted: the lines of later steps are cut off, and
+    /// one that is not whole.
+    pub(crate) fn resume(file: &Path, cycle: u64) -> Result<Self, (PathBuf, io::Error)> {
+        let text = match std::fs::read_to_string(file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             Err(error) => return Err((file.to_owned(), error)),
         };
         let mut history = Self::create(file)?;
-        let is_kept = |line: &&str| {
+        let mut before = HEADER.to_owned() + "\n";
+        let whole = text.split_inclusive('\n').skip(1).filter(|line| line.ends_with('\n'));
+        for line in whole {
             let number = line.split(',').next().and_then(|number| number.parse::<u64>().ok());
-            number.is_some_and(|number| number <= cycle)
-        };
-        for line in before.lines().skip(1).filter(is_kept) {
-            writeln!(history.lines, "{line}").map_err(|error| (file.to_owned(), error))?;
+            if number.is_some_and(|number| number <= cycle) {
+                before.push_str(line);
+                let seconds = line.trim_end().rsplit(',').next().and_then(|it| it.parse().ok());
+                history.seconds = seconds.unwrap_or(history.seconds);
+            }
         }
+        history.before = Some(before);
         Ok(history)
     }
 
@@ -89,11 +107,37 @@ impl History {
         time: f64,
         through: Through,
         seconds: f64,
-    ) -> Result<(), (PathBuf, std::io::Error)> {
+    ) -> Result<(), (PathBuf, io::Error)> {
         let Through { mass_in, mass_out, pressure_drop } = through;
-        writeln!(self.lines, "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}")
-            // A run may be watched through it, and may be ended by force.
-            .and_then(|()| self.lines.flush())
+        let seconds = self.seconds + seconds;
+        self.begin()
+            .and_then(|lines| {
+                writeln!(
+                    lines,
+                    "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}"
+                )?;
+                // A run may be watched through it, and may be ended by force.
+                lines.flush()
+            })
             .map_err(|error| (self.file.clone(), error))
+    }
+
+    /// The end of the file, which is begun where it has not been.
+    fn begin(&mut self) -> io::Result<&mut BufWriter<File>> {
+        let lines = match self.lines.take() {
+            Some(lines) => lines,
+            None => match &self.before {
+                Some(before) => {
+                    write_durably(&self.file, |out| out.write_all(before.as_bytes()))?;
+                    BufWriter::new(OpenOptions::new().append(true).open(&self.file)?)
+                }
+                None => {
+                    let mut lines = BufWriter::new(File::create(&self.file)?);
+                    writeln!(lines, "{HEADER}")?;
+                    lines
+                }
+            },
+        };
+        Ok(self.lines.insert(lines))
     }
 }

@@ -10,8 +10,9 @@
 //! - Linear tetrahedra for velocity and pressure, in the arbitrary Lagrangian-Eulerian frame
 //!   (Donea, Giuliani and Halleux 1982): nodal values travel with the mesh, and the convecting
 //!   velocity is `u - w` with the mesh velocity `w`.
-//! - Time: the second-order backward difference, convecting velocity extrapolated; the first-order
-//!   one in the first step and while the mesh moves.
+//! - Time: the second-order backward difference; the first-order one while the mesh moves, and in
+//!   each step that begins with an impulse: the first, the one in which the mesh starts or stops,
+//!   and where a parameter changes. The convecting velocity is extrapolated in all steps but those.
 //! - Momentum: convection linearised and implicit, SUPG (Brooks and Hughes 1982). One matrix for
 //!   the three components, solved by BiCGStab with ILU(0).
 //! - Pressure: incremental projection (van Kan 1986; Guermond, Minev and Shen 2006), with
@@ -22,14 +23,16 @@
 //!   du/dn = 0`); backflow is damped (Bazilevs et al. 2009).
 //! - A wall that starts or stops within one step acts by an impulse: the velocity is projected onto
 //!   the new boundary values before the step (Gresho and Sani 1998, on impulsive starts). The
-//!   impulse is no part of the reported pressure.
+//!   impulse is no part of the reported pressure, but for what its projections leave to that of the
+//!   step.
 //!
 //! # What is guaranteed, and what is not
 //!
 //! - A uniform stream stays uniform to rounding, whatever the mesh does: all terms act on
 //!   differences of nodal values.
-//! - Mass: the flux of the velocity through the whole boundary is 0 to the tolerance of the
-//!   pressure solve, in every step, walls that move included. No pressure is prescribed strongly,
+//! - Mass: where there is an outlet, the flux of the velocity through the whole boundary is 0 to the
+//!   tolerance of the pressure solve, in every step, walls that move included. Without one, what the
+//!   mesh gains or loses in volume stretches the fluid ([`StepOutcome::stretch`]). No pressure is prescribed strongly,
 //!   so that the equation of continuity is tested with every shape function, those at the outlet
 //!   included. Within the domain it holds weakly.
 //! - The same bits whatever the number of threads. On several ranks the same bits each time; the
@@ -48,6 +51,7 @@ mod boundary;
 pub mod case;
 mod error;
 mod fluid;
+mod folder;
 mod geometry;
 pub mod history;
 pub mod linear;
@@ -55,7 +59,7 @@ mod momentum;
 pub mod partition;
 pub mod parts;
 pub mod program;
-mod ranks;
+pub mod ranks;
 pub mod report;
 pub mod saved;
 mod solver;

@@ -13,8 +13,11 @@ use tombolo::Stopper;
 use tombolo::communicator::{Communicator, Solo};
 use tombolo::deform::linear::{BuiltIn, Solvers};
 use tombolo::pipelines::language::Listen;
+use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
+use tombolo_flow::ranks::{agreed, threads};
+use tombolo_flow::report::make_file;
 
 /// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser,
 /// and given another shape while it runs.
@@ -55,7 +58,7 @@ struct Arguments {
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT|unix:/PATH", conflicts_with = "headless")]
     listen: Option<Listen>,
-    /// Save the state of the run every so many steps, and when it is stopped
+    /// Save the state of the run every so many steps, and at the end
     #[arg(long, value_name = "N")]
     checkpoint_every: Option<NonZeroU64>,
     /// The file of the state; without it flow.state in the folder of the output
@@ -64,7 +67,7 @@ struct Arguments {
     /// Go on from a state that was saved, with the same case on as many ranks
     #[arg(long, value_name = "FILE")]
     restart: Option<PathBuf>,
-    /// How many threads each rank uses; without it the cores are shared out evenly
+    /// How many threads each rank uses; without it the cores that it may run on are shared out evenly
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Leave this rank without any of the mesh (to test what must work on any partition)
@@ -76,6 +79,9 @@ struct Arguments {
     /// Do not tell the adaptor which vertices of the ranks are the same (to test)
     #[arg(long, hide_short_help = true)]
     without_numbers: bool,
+    /// How well the projections of an impulse are solved (to test that ranks solve the same)
+    #[arg(long, value_name = "RELATIVE", hide_short_help = true)]
+    impulse_tolerance: Option<f64>,
 }
 
 fn main() -> ExitCode {
@@ -109,6 +115,7 @@ fn stop_on_signals(stopper: Stopper) -> std::io::Result<()> {
 }
 
 /// Whether this process was started by mpirun, together with others or alone.
+#[cfg(feature = "distributed")]
 fn under_mpirun() -> bool {
     ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"]
         .into_iter()
@@ -145,17 +152,39 @@ fn on_ranks(
     })
 }
 
+/// Whether this process was started together with others, which would write the same files.
+#[cfg(not(feature = "distributed"))]
+fn is_one_of_several() -> bool {
+    let said = |name: &str| std::env::var(name).ok();
+    let size =
+        ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"].into_iter().find_map(said);
+    // What starts processes by PMIx does not say how many there are.
+    size.is_some_and(|size| size != "1") || said("PMIX_RANK").is_some_and(|rank| rank != "0")
+}
+
 #[cfg(not(feature = "distributed"))]
 fn on_ranks(
     work: impl FnOnce(Ranks, Arc<dyn Solvers>) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<(), String> {
-    let ranks = std::env::var("OMPI_COMM_WORLD_SIZE").or_else(|_| std::env::var("PMI_SIZE"));
-    if under_mpirun() && ranks.is_ok_and(|ranks| ranks != "1") {
+    if is_one_of_several() {
         return Err(
             "started on several ranks, but built for one process; build it with `--features distributed`".into()
         );
     }
     work(Arc::new(Solo), Arc::new(BuiltIn)).map_err(|error| error.to_string())
+}
+
+/// Lets people and signals reach the run.
+fn open(run: &mut Run) -> Result<(), Box<dyn std::error::Error>> {
+    stop_on_signals(run.stopper())?;
+    let mut output = std::io::stdout();
+    let invitation = run.invitation(output.is_terminal());
+    let invitation = invitation.map_err(|error| format!("the links were not written: {error}"))?;
+    if let Some(invitation) = invitation {
+        // Where nobody reads it the run goes on; the links are in their file.
+        let _ = writeln!(output, "flow: {invitation}").and_then(|()| output.flush());
+    }
+    Ok(())
 }
 
 fn run(
@@ -164,9 +193,7 @@ fn run(
     solvers: Arc<dyn Solvers>,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let is_first = ranks.rank() == 0;
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads =
-        arguments.threads.or_else(|| (ranks.size() > 1).then(|| (cores() / ranks.size()).max(1)));
+    let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| threads(&*ranks)));
     if let Some(threads) = threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
     }
@@ -190,21 +217,18 @@ fn run(
             shuffle: arguments.shuffle,
             without_numbers: arguments.without_numbers,
         },
+        solves: Settings {
+            impulse_tolerance: arguments
+                .impulse_tolerance
+                .unwrap_or(Settings::default().impulse_tolerance),
+            ..Settings::default()
+        },
     };
-    if let Some(file) = arguments.report.as_ref().filter(|_| is_first) {
-        // Before the run: what it comes to is not to be lost for a misspelt folder.
-        let opened = std::fs::OpenOptions::new().create(true).append(true).open(file);
-        opened.map_err(|error| format!("{}: {error}", file.display()))?;
+    if let Some(file) = &arguments.report {
+        make_file(&*ranks, file)?;
     }
-    let mut run = Run::solved_by(ranks, solvers, &options)?;
-    stop_on_signals(run.stopper())?;
-    let mut output = std::io::stdout();
-    let invitation = run.invitation(output.is_terminal());
-    let invitation = invitation.map_err(|error| format!("the links were not written: {error}"))?;
-    if let Some(invitation) = invitation {
-        writeln!(output, "flow: {invitation}")?;
-        output.flush()?;
-    }
+    let mut run = Run::solved_by(Arc::clone(&ranks), solvers, &options)?;
+    agreed(&*ranks, open(&mut run))?;
     let report = run.finish()?;
     if let Some(file) = arguments.report.filter(|_| is_first) {
         let text = serde_json::to_string_pretty(&report)? + "\n";

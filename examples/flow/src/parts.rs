@@ -73,6 +73,9 @@ impl Share {
     ) -> Result<(Self, Vec<Patch>), DistributedError> {
         let (rank, ranks) = (communicator.rank(), communicator.size());
         if ranks == 1 {
+            if let Some(rank) = dealing.empty_rank {
+                agree(communicator, Err::<(), _>(DealError::EmptyRank { rank, ranks }))?;
+            }
             let part = Part::of(&mesh.into())?;
             let shared = SharedVertices::find(communicator, &part)?;
             let own = part.cells.clone();
@@ -95,7 +98,7 @@ impl Share {
             .map(|eight| usize::try_from(u64::from_le_bytes(*eight)).unwrap_or(0))
             .collect();
         let cut = Part::cut(mesh, &of_cells, rank, true).map(|part| match dealing.shuffle {
-            Some(seed) => shuffled(&part, seed + rank as u64),
+            Some(seed) => shuffled(&part, seed.wrapping_add(rank as u64)),
             None => part,
         });
         let made = cut.and_then(|part| Ok((part.view().to_mesh()?, part.own_cells(), part)));

@@ -22,13 +22,17 @@ use tombolo_pipelines::language::{
 };
 
 use crate::case::{Case, CaseError};
+use crate::folder::make_folder_of;
 use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
 use crate::ranks::agreed;
-use crate::report::{FlowReport, MeshReport, Report};
+use crate::report::{FlowReport, MeshReport, Report, Unwritten};
 use crate::saved::{self, State, StateError};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
 use crate::{Patch, SolverError};
+
+/// By which part of its volume a fluid may be stretched before that is told.
+const STRETCH: f64 = 1e-6;
 
 /// The options of a run.
 #[derive(Debug, Clone, Default)]
@@ -51,13 +55,14 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Where the flow is written step by step, as comma-separated values.
     pub history: Option<PathBuf>,
-    /// Where the state of the run is saved, and after how many steps again; at the end of a run that is
-    /// stopped too.
+    /// Where the state of the run is saved, and after how many steps again; at the end of the run too.
     pub checkpoint: Option<(PathBuf, NonZeroU64)>,
     /// The saved state that the run goes on from.
     pub restart: Option<PathBuf>,
     /// How the mesh is dealt out, where there are several ranks.
     pub dealing: Dealing,
+    /// How the equations are solved.
+    pub solves: SolverSettings,
 }
 
 /// Why a run could not be done, or ended early.
@@ -126,12 +131,14 @@ pub struct Run {
     /// The mesh as it was read, on the rank that writes it.
     whole: Option<Mesh>,
     points: Vec<Vector>,
+    /// The parameters that are asked for; where they make no flow, the solver still has those before.
     parameters: Vec<f64>,
     worst: MeshReport,
     flow: FlowReport,
     /// Whether the flow is written step by step: by the first rank, and measured by all.
     has_history: bool,
     history: Option<History>,
+    unwritten: Unwritten,
 }
 
 /// The input that every rank reads from files.
@@ -201,7 +208,7 @@ impl Run {
         let conditions = patches.iter().map(role).collect();
         let (share, patches) = Share::of(&communicator, &mesh, &surface, patches, options.dealing)?;
         let whole = (is_first && options.out.is_some()).then_some(mesh);
-        let (fluid, settings) = (case.fluid(&parameters), SolverSettings::default());
+        let (fluid, settings) = (case.fluid(&parameters), options.solves);
         let mut solver = Solver::new(&share.mesh, share.shared.halo(), patches, fluid, settings)?;
         solver.set_parameters(&parameters);
         let (velocity, pressure) = case.initial_values();
@@ -217,6 +224,10 @@ impl Run {
             None => History::create(file),
         });
         let history = agreed(&*communicator, history.transpose().map_err(unwritten))?;
+        if let Some((file, _)) = &options.checkpoint {
+            let made = if is_first { make_folder_of(file) } else { Ok(()) };
+            agreed(&*communicator, made.map_err(|source| unwritten((file.clone(), source))))?;
+        }
         let adaptor = Adaptor::initialize(Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -238,6 +249,7 @@ impl Run {
             flow: FlowReport::default(),
             has_history: options.history.is_some(),
             history,
+            unwritten: Unwritten::default(),
             out: options.out.clone(),
             steps,
             checkpoint: options.checkpoint.clone(),
@@ -312,6 +324,7 @@ impl Run {
             stream: adaptor.stream,
             pipelines: adaptor.pipelines,
             flow: self.flow,
+            unwritten: self.unwritten.told,
             error,
         })
     }
@@ -338,27 +351,43 @@ impl Run {
                 }
             }
             if !steering.parameters.is_empty() {
-                self.solver.set_parameters(&self.parameters);
-                if let Err(error) = self.solver.set_fluid(self.case.fluid(&self.parameters)) {
-                    eprintln!("flow: cycle {}: {error}; the fluid stays as it was", step.cycle);
+                let fluid = self.case.fluid(&self.parameters);
+                let changed = self.solver.change(&self.parameters, fluid, time_step);
+                if let Err(error) = changed
+                    && self.communicator.rank() == 0
+                {
+                    eprintln!(
+                        "flow: cycle {}: {error}; the flow goes on with the parameters before",
+                        step.cycle
+                    );
                 }
             }
-            let moved = match steering.motion {
-                Some(motion) => {
-                    self.points.copy_from_slice(&motion.coordinates);
-                    true
+            let coordinates = steering.motion.map(|motion| motion.coordinates);
+            let motion = coordinates.as_deref().map(|points| Motion { points });
+            let outcome = match self.solver.step(time_step, motion) {
+                Ok(outcome) => outcome,
+                Err(error) => {
+                    // The mesh that the flow belongs to: a shape that is refused is none of the run's.
+                    self.points = self.solver.points();
+                    return Err(error.into());
                 }
-                None => false,
             };
-            if moved {
+            if let Some(coordinates) = coordinates {
+                self.points.copy_from_slice(&coordinates);
                 let shape = self.share.measure(&*self.communicator, &self.points);
                 self.worst.inverted = self.worst.inverted.max(shape.inverted);
                 self.worst.min_scaled_jacobian =
                     self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
-            let motion = moved.then_some(Motion { points: &self.points });
-            let outcome = self.solver.step(time_step, motion)?;
+            let was_stretched = self.flow.stretch.abs() > STRETCH;
             self.flow.count(&outcome, &self.solver);
+            if self.flow.stretch.abs() > STRETCH && !was_stretched && self.communicator.rank() == 0
+            {
+                eprintln!(
+                    "flow: cycle {}: nothing can flow out or in, but the volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
+                    step.cycle, self.flow.stretch
+                );
+            }
             if self.has_history {
                 let (cycle, time, through) =
                     (self.solver.cycle(), self.solver.time(), Through::now(&self.solver));
@@ -367,21 +396,34 @@ impl Run {
                     history.add(cycle, time, through, seconds).map_err(unwritten)
                 };
                 let added = self.history.as_mut().map_or(Ok(()), add);
-                agreed(&*self.communicator, added)?;
+                let added = agreed(&*self.communicator, added);
+                self.note("the history", added);
             }
             self.solver.velocity_into(&mut velocity);
             self.solver.pressure_into(&mut pressure);
+            let is_last = steering.stop || self.steps == Some(self.solver.cycle());
             if let Some((file, every)) = &self.checkpoint
-                && (steering.stop || self.solver.cycle() % *every == 0)
+                && (is_last || self.solver.cycle() % *every == 0)
             {
                 let checkpoint = self.adaptor.checkpoint();
-                saved::write(&*self.communicator, file, &self.solver, &checkpoint)?;
+                let saved = saved::write(&*self.communicator, file, &self.solver, &checkpoint);
+                self.note("the state", saved);
             }
             if steering.stop {
                 break;
             }
         }
         Ok(())
+    }
+
+    /// Tells what could not be written at the end of a step. A run does not end for that: what was
+    /// written before is still there, and there may be room again the next time.
+    fn note<E: std::fmt::Display>(&mut self, what: &'static str, written: Result<(), E>) {
+        if let Some(told) = self.unwritten.note(what, self.solver.cycle(), written)
+            && self.communicator.rank() == 0
+        {
+            eprintln!("flow: {told}; the run goes on");
+        }
     }
 
     /// Writes the mesh as it is, its features, the velocity and the pressure, in the numbers of the
@@ -441,6 +483,9 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
 }
 
 fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {
+    if options.replay.is_some() {
+        return Ok(Vec::new());
+    }
     match options.orders.as_ref().or(case.orders.as_ref()) {
         None => Ok(Vec::new()),
         Some(file) => Ok(Settings::default().orders_from_file(file)?.orders),

@@ -1,12 +1,19 @@
 //! What a run came to, as one JSON object.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Display;
+use std::fs::File;
+use std::path::Path;
 
 use serde::Serialize;
+use tombolo::communicator::Communicator;
 use tombolo::stream::StreamCounts;
 use tombolo::{OrderReport, PipelineReport, Spread};
 
+use crate::folder::make_folder_of;
 use crate::history::Through;
+use crate::program::ProgramError;
+use crate::ranks::agreed;
 use crate::solver::{Solver, StepOutcome};
 
 /// The report of a run.
@@ -30,6 +37,10 @@ pub struct Report {
     pub pipelines: Vec<PipelineReport>,
     /// The flow.
     pub flow: FlowReport,
+    /// What could not be written while the run went on, and why: the saved state, the history. Of
+    /// several failures in a row the first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unwritten: Vec<String>,
     /// Why the run ended early, where it did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
@@ -42,22 +53,26 @@ pub struct MeshReport {
     pub vertices: usize,
     /// How many cells.
     pub cells: usize,
-    /// The most inverted cells of any shape of the run.
+    /// The most inverted cells of any shape since the run began or was restarted.
     pub inverted: usize,
-    /// The least scaled Jacobian of any shape of the run.
+    /// The least scaled Jacobian of any of these shapes.
     pub min_scaled_jacobian: f64,
 }
 
-/// The flow at the end of a run, and what its solves took.
+/// The flow at the end of a run, and what its solves took since it began or was restarted.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FlowReport {
     /// Volume per time that flows in where the velocity is prescribed.
     pub mass_in: f64,
     /// Volume per time that flows out where the pressure is prescribed.
     pub mass_out: f64,
-    /// The greatest flux through the whole boundary in any step, relative to what flowed through it
-    /// then.
+    /// The greatest flux through the whole boundary in any step since the run began or was restarted,
+    /// relative to the most that flowed through it; where nothing does, to the greatest velocity
+    /// times the area of the boundary.
     pub worst_imbalance: f64,
+    /// The part of its volume by which the fluid was stretched in all, or compressed where it is
+    /// negative, since nothing lets it in or out: 0 with an outlet.
+    pub stretch: f64,
     /// Mean pressure where the velocity is prescribed less that where the pressure is.
     pub pressure_drop: f64,
     /// The flux out through each feature.
@@ -78,15 +93,63 @@ pub struct FlowReport {
     pub seconds: f64,
     #[serde(skip)]
     steps: u64,
+    /// The most that flowed through the boundary in any step.
+    #[serde(skip)]
+    most_through: f64,
+}
+
+/// Less than this part of what could flow through the boundary is nothing but rounding.
+const NOTHING: f64 = 1e-9;
+
+/// Keeps in mind what could not be written while the run went on.
+#[derive(Debug, Default)]
+pub(crate) struct Unwritten {
+    /// What was told.
+    pub(crate) told: Vec<String>,
+    failing: BTreeSet<&'static str>,
+}
+
+impl Unwritten {
+    /// Takes note of an attempt; what is to be told, where it is the first in a row that failed.
+    pub(crate) fn note(
+        &mut self,
+        what: &'static str,
+        cycle: u64,
+        written: Result<(), impl Display>,
+    ) -> Option<&str> {
+        let Err(error) = written else {
+            self.failing.remove(what);
+            return None;
+        };
+        if !self.failing.insert(what) {
+            return None;
+        }
+        self.told.push(format!("cycle {cycle}: {what} could not be written: {error}"));
+        self.told.last().map(String::as_str)
+    }
+}
+
+/// Makes the file that the report of a run is to go to, with its folder: what the run comes to is not
+/// to be lost for a name at which no file can be, and what another run came to is not to be taken
+/// for it. The first rank does so. Collective.
+///
+/// # Errors
+/// [`ProgramError::File`], on several ranks the same on all of them.
+pub fn make_file(communicator: &dyn Communicator, file: &Path) -> Result<(), ProgramError> {
+    let made = match communicator.rank() {
+        0 => make_folder_of(file).and_then(|()| File::create(file)).map(drop),
+        _ => Ok(()),
+    };
+    agreed(communicator, made.map_err(|source| ProgramError::File { file: file.into(), source }))
 }
 
 impl FlowReport {
     /// Counts one step.
     pub(crate) fn count(&mut self, outcome: &StepOutcome, solver: &Solver) {
         let through: f64 = 0.5 * solver.fluxes().into_iter().map(f64::abs).sum::<f64>();
-        if through > 0.0 {
-            self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs() / through);
-        }
+        self.most_through = self.most_through.max(through);
+        self.worst_imbalance = self.worst_imbalance.max(outcome.imbalance.abs());
+        self.stretch += outcome.stretch;
         self.steps += 1;
         self.momentum_iterations += outcome.momentum.iterations as f64;
         self.pressure_iterations += outcome.pressure.iterations as f64;
@@ -98,11 +161,13 @@ impl FlowReport {
         let steps = self.steps.max(1) as f64;
         self.momentum_iterations /= steps;
         self.pressure_iterations /= steps;
-        for ((patch, flux), (pressure, _)) in
+        let mut whole_area = 0.0;
+        for ((patch, flux), (pressure, area)) in
             solver.patches().iter().zip(solver.fluxes()).zip(solver.mean_pressures())
         {
             self.fluxes.insert(patch.name.clone(), flux);
             self.mean_pressures.insert(patch.name.clone(), pressure);
+            whole_area += area;
         }
         Through {
             mass_in: self.mass_in,
@@ -110,6 +175,12 @@ impl FlowReport {
             pressure_drop: self.pressure_drop,
         } = Through::now(solver);
         self.max_velocity = solver.max_velocity();
+        let possible = self.max_velocity * whole_area;
+        let through =
+            if self.most_through > NOTHING * possible { self.most_through } else { possible };
+        if through > 0.0 {
+            self.worst_imbalance /= through;
+        }
         self.courant = solver.courant(time_step);
     }
 }

@@ -8,10 +8,11 @@ use tombolo::{Checkpoint, CheckpointError};
 use tombolo_pipelines::files::write_durably;
 
 use crate::SolverError;
+use crate::folder::make_folder_of;
 use crate::ranks::agreed;
 use crate::solver::Solver;
 
-const MAGIC: &[u8] = b"flow state 1\n";
+const MAGIC: &[u8] = b"flow state 2\n";
 
 /// Why a state cannot be written, read or gone on from.
 #[derive(Debug, thiserror::Error)]
@@ -46,13 +47,16 @@ pub(crate) fn write(
     let mut mine = Writer::default();
     solver.save(&mut mine);
     mine.bytes(&checkpoint.to_bytes());
-    let all = communicator.gather(0, &mine.into_bytes());
+    let mut mine = mine.into_bytes();
+    mine.extend(crc32fast::hash(&mine).to_le_bytes());
+    let all = communicator.gather(0, &mine);
     let written = all.map_or(Ok(()), |all| replace(file, &all));
     let written = written.map_err(|source| StateError::File { file: file.into(), source });
     agreed(communicator, written)
 }
 
 fn replace(file: &Path, states: &[Vec<u8>]) -> io::Result<()> {
+    make_folder_of(file)?;
     write_durably(file, |out| {
         out.write_all(MAGIC)?;
         for state in states {
@@ -84,7 +88,14 @@ impl State {
         for _ in 0..rank {
             mine = states.bytes();
         }
-        Ok(Self { bytes: mine.map_err(|_| other())?.to_vec() })
+        let (mine, checksum) = mine.map_err(|_| other())?.split_last_chunk().ok_or_else(other)?;
+        if crc32fast::hash(mine) != u32::from_le_bytes(*checksum) {
+            return Err(failed(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "the state is damaged: its checksum is another",
+            )));
+        }
+        Ok(Self { bytes: mine.to_vec() })
     }
 
     /// Lets a solver go on from it; the adaptor's checkpoint. Collective.

@@ -1,6 +1,9 @@
 //! One time step after the other.
 
+mod checks;
 mod measures;
+mod motion;
+mod parameters;
 mod projection;
 mod saved;
 
@@ -17,7 +20,8 @@ use crate::linear::{BiCgStab, BlockIncompleteLu, Outcome, for_each, sum};
 use crate::momentum::{self, ElementState, Known};
 use crate::ranks::{agreed, total};
 use crate::topology::Topology;
-use projection::Projection;
+use checks::check_elements;
+use projection::{Projection, Start};
 
 /// How much of the energy that flows in at an outlet is damped; one half makes the energy of the
 /// scheme bounded.
@@ -26,6 +30,10 @@ const BACKFLOW: f64 = 0.5;
 /// How often the velocity is projected at the beginning of a step with an impulse.
 const IMPULSE_PROJECTIONS: usize = 4;
 
+/// How much longer than the last one a step may be with a time derivative of second order, which is
+/// stable up to 1 + sqrt(2) (Grigorieff 1983).
+const MOST_GROWTH: f64 = 2.0;
+
 /// How the equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -33,13 +41,21 @@ pub struct Settings {
     pub momentum_tolerance: f64,
     /// The residual of the pressure equation, relative to its right-hand side.
     pub pressure_tolerance: f64,
+    /// The same of each of the projections by which an impulse acts. They are approximate however
+    /// well they are solved; what they leave is for the solve of the step, at its own tolerance.
+    pub impulse_tolerance: f64,
     /// No solve takes more iterations than this, with the preconditioner that it begins with.
     pub iteration_limit: usize,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { momentum_tolerance: 1e-7, pressure_tolerance: 1e-6, iteration_limit: 200 }
+        Self {
+            momentum_tolerance: 1e-7,
+            pressure_tolerance: 1e-6,
+            impulse_tolerance: 1e-2,
+            iteration_limit: 200,
+        }
     }
 }
 
@@ -55,11 +71,16 @@ pub struct Motion<'a> {
 pub struct StepOutcome {
     /// The solve of the momentum equation.
     pub momentum: Outcome,
-    /// The solve of the pressure equation; both solves where the step began with an impulse.
+    /// The solve of the pressure equation; where the step began with an impulse, the iterations of
+    /// its projections too.
     pub pressure: Outcome,
-    /// The flux of the velocity out through the whole boundary; 0 up to the tolerance of the
-    /// pressure solve.
+    /// The flux of the velocity out through the whole boundary; where there is an outlet, 0 up to the
+    /// tolerance of the pressure solve.
     pub imbalance: f64,
+    /// The part of its volume by which the fluid was stretched in this step, or compressed where it is
+    /// negative: without an outlet nothing makes up for what the mesh gains or loses, or for
+    /// prescribed velocities that bring in more or less than they take out. 0 with an outlet.
+    pub stretch: f64,
 }
 
 /// The flow on one mesh.
@@ -86,10 +107,12 @@ pub struct Solver {
     potential: Vec<f64>,
     mesh_velocity: Vec<Vector>,
     moving: bool,
+    /// How much volume the mesh has gained in the last step.
+    gain: f64,
     /// Whether the boundary values jump before the next step.
     jump: bool,
-    /// How many steps of the present, unbroken history there are for the time derivative.
-    history_length: u32,
+    /// The length of the last step.
+    last_step: f64,
 
     momentum: SparseMatrix<1>,
     momentum_preconditioner: BlockIncompleteLu,
@@ -136,6 +159,7 @@ impl Solver {
             .and_then(|()| Boundary::new(&topology, patches));
         let mut boundary = agreed(communicator, own)?;
         boundary.measure(&topology, &geometry, halo.communicator());
+        boundary.check_outlets(halo.communicator())?;
         let (vertices, rows) = (topology.vertex_count(), topology.rows());
         let projection =
             Projection::new(&topology, &geometry, &boundary, &halo, settings.iteration_limit);
@@ -152,8 +176,9 @@ impl Solver {
             potential: vec![0.0; vertices],
             mesh_velocity: vec![[0.0; 3]; vertices],
             moving: false,
+            gain: 0.0,
             jump: true,
-            history_length: 0,
+            last_step: 0.0,
             momentum: topology.zeros.clone(),
             momentum_preconditioner: BlockIncompleteLu::new(&topology.zeros, &topology.diagonal),
             momentum_solver: BiCgStab::default(),
@@ -177,33 +202,16 @@ impl Solver {
             self.velocity[vertex] = [0, 1, 2].map(|axis: usize| velocity[axis].at(&place));
             self.pressure[vertex] = pressure.at(&place);
         }
-        self.history_length = 0;
         self.jump = true;
-    }
-
-    /// Sets the parameters that boundary values may depend on; a change acts from the next step on,
-    /// as a jump.
-    pub fn set_parameters(&mut self, parameters: &[f64]) {
-        if self.parameters != parameters {
-            self.parameters = parameters.to_vec();
-            self.jump = true;
-        }
-    }
-
-    /// Changes the fluid from the next step on.
-    ///
-    /// # Errors
-    /// [`SolverError::NotPositive`]; the fluid then stays as it is.
-    pub fn set_fluid(&mut self, fluid: Fluid) -> Result<(), SolverError> {
-        fluid.check()?;
-        self.fluid = fluid;
-        Ok(())
     }
 
     /// Goes on by one time step; `motion` says where the mesh is at its end, where it moves.
     ///
     /// The mesh velocity over the step is the displacement divided by the time step. No-slip walls
     /// take the fluid with them; a prescribed velocity is taken as it stands.
+    ///
+    /// Steps may have any lengths: the weights of the time derivative follow them. Behind a step
+    /// that is less than half as long it is of first order, as the second order is unstable there.
     ///
     /// # Errors
     /// [`SolverError::Inverted`] for a motion that turns an element inside out, and
@@ -219,6 +227,10 @@ impl Solver {
             return Err(SolverError::NotPositive { what: "the time step", value: time_step });
         }
         let moves = self.move_mesh(time_step, motion)?;
+        if !moves && !self.moving {
+            // A mesh that only pauses between two shapes of a schedule moves again in the next step.
+            self.projection.settle(&self.geometry.points);
+        }
         let end = self.time + time_step;
         let impulse = self.jump || moves != self.moving;
         let mut pressure_outcome = None;
@@ -233,8 +245,11 @@ impl Solver {
             self.halo.update(3, self.velocity.as_flattened_mut());
             pressure_outcome = Some(self.apply_impulse());
         }
-        let second_order = !impulse && !moves && self.history_length >= 2;
-        let rate = self.predict(time_step, second_order);
+        // How much longer this step is than the last; nothing is behind an impulse.
+        let growth = (!impulse).then(|| time_step / self.last_step);
+        let second_order = !moves && growth.is_some_and(|growth| growth <= MOST_GROWTH);
+        let growth = growth.unwrap_or(0.0).min(MOST_GROWTH);
+        let rate = self.predict(time_step, growth, second_order);
         self.assemble(time_step, rate, end);
 
         std::mem::swap(&mut self.previous_velocity, &mut self.velocity);
@@ -245,7 +260,8 @@ impl Solver {
         self.boundary.impose_slip(&mut self.velocity, &self.mesh_velocity);
         self.halo.update(3, self.velocity.as_flattened_mut());
 
-        let mut pressure = self.project(Some(self.fluid.density));
+        let start = if impulse { Start::Zero } else { Start::Last };
+        let mut pressure = self.project(Some(self.fluid.density), start);
         let scale = self.fluid.density * rate;
         let potential = &self.potential;
         for_each(&mut self.pressure, |index, value| {
@@ -260,11 +276,12 @@ impl Solver {
         }
         self.moving = moves;
         self.jump = false;
-        self.history_length = if impulse { 2 } else { self.history_length.saturating_add(1) };
+        self.last_step = time_step;
         self.cycle += 1;
         self.time = end;
         self.check_finite()?;
-        Ok(StepOutcome { momentum, pressure, imbalance: self.imbalance() })
+        let (imbalance, stretch) = (self.imbalance(), self.stretch(time_step));
+        Ok(StepOutcome { momentum, pressure, imbalance, stretch })
     }
 
     /// Projects the velocity onto its new boundary values. The projection is approximate where the
@@ -273,7 +290,7 @@ impl Solver {
         let mut total = Outcome { converged: true, ..Outcome::default() };
         for _ in 0..IMPULSE_PROJECTIONS {
             self.potential.fill(0.0);
-            let outcome = self.project(None);
+            let outcome = self.project(None, Start::Impulse);
             total.iterations += outcome.iterations;
             total.residual = outcome.residual;
             total.converged &= outcome.converged;
@@ -282,50 +299,19 @@ impl Solver {
         total
     }
 
-    /// Puts the mesh where it is at the end of the step; whether it moved.
-    fn move_mesh(&mut self, time_step: f64, motion: Option<Motion>) -> Result<bool, SolverError> {
-        let Some(motion) = motion else {
-            if self.moving {
-                self.mesh_velocity.fill([0.0; 3]);
-            }
-            return Ok(false);
-        };
-        let geometry = agreed(self.halo.communicator(), self.moved(motion))?;
-        let mut moves = false;
-        for (velocity, (new, old)) in
-            self.mesh_velocity.iter_mut().zip(geometry.points.iter().zip(&self.geometry.points))
-        {
-            *velocity = std::array::from_fn(|axis| (new[axis] - old[axis]) / time_step);
-            moves |= *velocity != [0.0; 3];
-        }
-        self.geometry = geometry;
-        self.boundary.measure(&self.topology, &self.geometry, self.halo.communicator());
-        let renewed = self.projection.renew(&self.topology, &self.geometry, &self.boundary);
-        agreed(self.halo.communicator(), renewed.map_err(SolverError::from))?;
-        Ok(self.halo.communicator().any(moves))
-    }
-
-    /// The shape of the mesh at the end of a motion.
-    fn moved(&self, motion: Motion) -> Result<Geometry, SolverError> {
-        let vertices = self.topology.vertex_count();
-        if motion.points.len() != vertices {
-            return Err(SolverError::Length {
-                what: "coordinates",
-                found: motion.points.len(),
-                expected: vertices,
-            });
-        }
-        let geometry = Geometry::new(&self.topology, self.topology.to_solver(motion.points));
-        check_elements(&self.topology, &geometry, self.cycle)?;
-        Ok(geometry)
-    }
-
     /// Prepares the known part of the time derivative, the convecting velocity and the first guess
-    /// (in `scratch`); the rate.
-    fn predict(&mut self, time_step: f64, second_order: bool) -> f64 {
+    /// (in `scratch`); the rate. Nodal values travel with the mesh, so that they are extrapolated
+    /// while it moves too, by `growth`: the length of the step in lengths of the last, 0 where nothing
+    /// is behind it.
+    fn predict(&mut self, time_step: f64, growth: f64, second_order: bool) -> f64 {
         let (now, before, mesh) = (&self.velocity, &self.previous_velocity, &self.mesh_velocity);
         self.scratch.resize(now.len(), [0.0; 3]);
-        let (last, weights) = if second_order { (-1.0, [2.0, -0.5]) } else { (0.0, [1.0, 0.0]) };
+        let (rate, weights) = if second_order {
+            let both = 1.0 + growth;
+            ((1.0 + 2.0 * growth) / both, [both, -growth * growth / both])
+        } else {
+            (1.0, [1.0, 0.0])
+        };
         for_each(&mut self.history, |index, value| {
             let (now, before) = (now[index], before[index]);
             *value =
@@ -333,14 +319,14 @@ impl Solver {
         });
         for_each(&mut self.scratch, |index, value| {
             let (now, before) = (now[index], before[index]);
-            *value = std::array::from_fn(|c| now[c] + last * (before[c] - now[c]));
+            *value = std::array::from_fn(|c| now[c] + growth * (now[c] - before[c]));
         });
         let guess = &self.scratch;
         for_each(&mut self.convecting, |index, value| {
             let (guess, mesh) = (guess[index], mesh[index]);
             *value = std::array::from_fn(|c| guess[c] - mesh[c]);
         });
-        if second_order { 1.5 / time_step } else { 1.0 / time_step }
+        rate / time_step
     }
 
     /// Fills the momentum matrix and its right-hand side, boundary conditions included.
@@ -424,7 +410,7 @@ impl Solver {
 
     /// Makes the velocity satisfy continuity: solves for the potential and subtracts its gradient.
     /// With a density, continuity is stabilised by the states of the present step.
-    fn project(&mut self, stabilised: Option<f64>) -> Outcome {
+    fn project(&mut self, stabilised: Option<f64>, start: Start) -> Outcome {
         let rows = self.topology.rows();
         momentum::divergence(
             &self.topology,
@@ -445,12 +431,17 @@ impl Solver {
             );
         }
         let through: f64 = self.fluxes().into_iter().map(f64::abs).sum();
+        let tolerance = match start {
+            Start::Impulse => self.settings.impulse_tolerance,
+            Start::Zero | Start::Last => self.settings.pressure_tolerance,
+        };
         let outcome = self.projection.solve(
             &self.topology,
             &self.halo,
             &mut self.potential,
             &self.geometry.points,
-            self.settings.pressure_tolerance,
+            start,
+            tolerance,
             through,
             self.boundary.is_open(),
         );
@@ -501,52 +492,4 @@ impl Solver {
         let [integral, whole] = total(self.halo.communicator(), sums);
         self.pressure.iter_mut().for_each(|value| *value -= integral / whole);
     }
-
-    fn check_finite(&self) -> Result<(), SolverError> {
-        let (velocity, pressure) = (&self.velocity, &self.pressure);
-        let zero = sum(pressure.len(), |range| {
-            [range
-                .map(|v| (velocity[v][0] + velocity[v][1] + velocity[v][2] + pressure[v]) * 0.0)
-                .sum()]
-        });
-        if total(self.halo.communicator(), zero) == [0.0] {
-            return Ok(());
-        }
-        agreed(self.halo.communicator(), self.first_non_finite())
-    }
-
-    fn first_non_finite(&self) -> Result<(), SolverError> {
-        for (rank, &vertex) in self.topology.vertex_order.iter().enumerate() {
-            let values = [
-                self.velocity[rank][0],
-                self.velocity[rank][1],
-                self.velocity[rank][2],
-                self.pressure[rank],
-            ];
-            if let Some(component) = values.iter().position(|value| !value.is_finite()) {
-                return Err(SolverError::Diverged {
-                    cycle: self.cycle,
-                    time: self.time,
-                    quantity: if component < 3 { "velocity" } else { "pressure" },
-                    vertex: vertex as usize,
-                    position: self.geometry.points[rank],
-                    value: values[component],
-                });
-            }
-        }
-        Ok(())
-    }
-}
-
-fn check_elements(topology: &Topology, geometry: &Geometry, cycle: u64) -> Result<(), SolverError> {
-    let Some(element) = geometry.inverted() else { return Ok(()) };
-    let corners = topology.elements[element].map(|vertex| geometry.points[vertex as usize]);
-    Err(SolverError::Inverted {
-        cycle,
-        cell: topology.element_order[element] as usize,
-        position: std::array::from_fn(|axis| {
-            0.25 * corners.iter().map(|corner| corner[axis]).sum::<f64>()
-        }),
-        volume: geometry.elements[element].volume,
-    })
 }

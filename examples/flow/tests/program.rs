@@ -6,10 +6,11 @@ use std::sync::Arc;
 use tombolo_deform::communicator::threads;
 use tombolo_deform::mesh::FeatureSource;
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
+use tombolo_flow::Settings;
 use tombolo_flow::case::{Case, CaseError};
 use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
-use tombolo_flow::report::Report;
+use tombolo_flow::report::{Report, make_file};
 use tombolo_pipelines::files::{self, Compression};
 
 const CASE: &str = r#"{
@@ -159,6 +160,10 @@ fn names_what_is_wrong_in_a_case() {
     expect(
         failure("viscosity\": \"0.01 * thickness\"", "viscosity\": \"0.01 * x\""),
         &["viscosity"],
+    );
+    expect(
+        failure("\"density\": 1.0", "\"density\": \"max(0.01, x - 1)\""),
+        &["case.json:3:", "density", "the same everywhere"],
     );
     expect(
         failure("\"density\": 1.0", "\"density\": -1.0"),
@@ -321,7 +326,9 @@ fn difference(a: &Path, b: &Path) -> Vec<(String, f64)> {
 #[test]
 fn ranks_solve_what_one_process_solves() {
     let (folder, case) = folder(CASE);
-    let alone = Options { out: Some(folder.path().join("alone")), ..headless(&case) };
+    let settings = Settings::default();
+    let solves = Settings { impulse_tolerance: settings.pressure_tolerance, ..settings };
+    let alone = Options { out: Some(folder.path().join("alone")), solves, ..headless(&case) };
     let expected = run(&alone);
     let dealings = [
         Dealing::default(),
@@ -361,6 +368,202 @@ fn ranks_solve_what_one_process_solves() {
         let [few, many] = [&expected, &report].map(|report| report.flow.pressure_iterations);
         assert!(many < 3.0 * few + 10.0, "{few} iterations, on {ranks} ranks {many}");
     }
+}
+
+/// A state that cannot be saved, and a history that cannot be gone on with, are told; the run goes
+/// on.
+#[test]
+fn a_run_goes_on_where_its_state_cannot_be_saved() {
+    let (folder, case) = folder(CASE);
+    let at = |name: &str| folder.path().join(name);
+    let every = 3.try_into().unwrap();
+    let saving = |name: &str| Options { checkpoint: Some((at(name), every)), ..headless(&case) };
+    // Folders are made.
+    let options = Options { history: Some(at("tables/history.csv")), ..saving("new/flow.state") };
+    let report = run(&options);
+    assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+    assert!(at("new/flow.state").is_file() && at("tables/history.csv").is_file());
+    assert!(report.unwritten.is_empty(), "{:?}", report.unwritten);
+    // Where they cannot be, that is told before the run.
+    let refused = Run::new(&saving("case.json/flow.state")).err().unwrap().to_string();
+    assert!(refused.contains("case.json/flow.state"), "{refused}");
+    // A folder lies where the state should.
+    std::fs::create_dir_all(at("taken/flow.state")).unwrap();
+    let options = Options { out: Some(at("out")), ..saving("taken/flow.state") };
+    let report = run(&options);
+    assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+    let [told] = &report.unwritten[..] else { panic!("{:?}", report.unwritten) };
+    assert!(told.starts_with("cycle 3: the state") && told.contains("flow.state"), "{told}");
+    assert!(at("out/final.vtu").is_file());
+}
+
+/// A parameter that would make a boundary value infinite is refused, and the run goes on as before
+/// until another comes.
+#[test]
+fn a_parameter_that_makes_no_flow_is_refused() {
+    let divided = CASE
+        .replace("y * (1 - y)", "y * (1 - y) / thickness")
+        .replace("\"minimum\": 0.1", "\"minimum\": 0")
+        .replace("0.01 * thickness", "0.01 + 0 * thickness");
+    let (folder, case) = folder(&divided);
+    let orders = folder.path().join("orders.json");
+    let change = |cycle: u64, value: f64| {
+        format!(
+            r#"{{ "at": {{ "cycle": {cycle} }}, "parameter": {{ "name": "thickness", "value": {value} }} }}"#
+        )
+    };
+    let flow_in = |orders_text: String, ranks: usize| {
+        std::fs::write(&orders, orders_text).unwrap();
+        let report = run_on(ranks, &Options { orders: Some(orders.clone()), ..headless(&case) });
+        assert_eq!((report.cycles, report.error.as_deref()), (12, None));
+        report.flow.mass_in
+    };
+    let before = flow_in("[]".into(), 1);
+    for ranks in [1, 2] {
+        let refused = flow_in(format!("[{}]", change(3, 0.0)), ranks);
+        assert!((refused - before).abs() < 1e-9 * before, "{refused} {before}");
+        let halved = flow_in(format!("[{}, {}]", change(3, 0.0), change(6, 2.0)), ranks);
+        assert!((halved - 0.5 * before).abs() < 1e-9 * before, "{halved} {before}");
+    }
+}
+
+/// A replay has all its orders from the journal.
+#[test]
+fn a_replay_does_not_read_the_orders_of_the_case() {
+    let (folder, case) = folder(&CASE.replace(
+        "\"steps\": 12",
+        "\"steps\": 12, \"orders\": \"orders.json\", \"pipelines\": \"pipelines.json\"",
+    ));
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("orders.json"), ORDERS).unwrap();
+    std::fs::write(at("pipelines.json"), r#"{ "version": 1, "journal": "journal.jsonl" }"#)
+        .unwrap();
+    let applied = |options: Options| {
+        let report = run(&options);
+        let json = serde_json::to_value(&report.orders).unwrap();
+        let orders = json.as_array().unwrap();
+        orders.iter().filter(|order| order["status"] == "applied").count()
+    };
+    assert_eq!(applied(Options { out: Some(at("out")), ..headless(&case) }), 2);
+    std::fs::remove_file(at("orders.json")).unwrap();
+    let replay = Some(at("out/journal.jsonl"));
+    assert_eq!(applied(Options { out: Some(at("again")), replay, ..headless(&case) }), 2);
+}
+
+/// A lid drags the fluid along in a box that nothing enters: no flux is lost there.
+#[test]
+fn a_closed_box_has_no_imbalance() {
+    let cavity = CASE
+        .replace(r#""velocity": ["y * (1 - y)", 0, 0]"#, r#""wall": "no_slip""#)
+        .replace(r#""pressure": 0"#, r#""wall": "no_slip""#)
+        .replace(r#""y-max": { "wall": "no_slip" }"#, r#""y-max": { "velocity": [1, 0, 0] }"#);
+    let (_folder, case) = folder(&cavity);
+    let report = run(&headless(&case));
+    assert!(report.flow.max_velocity > 0.5 && report.flow.worst_imbalance < 1e-6);
+}
+
+#[test]
+fn one_process_cannot_be_left_empty() {
+    let (_folder, case) = folder(CASE);
+    let dealing = Dealing { empty_rank: Some(0), ..Dealing::default() };
+    let refused = Run::new(&Options { dealing, ..headless(&case) }).err().unwrap().to_string();
+    assert!(refused.contains("rank 0 cannot be left empty"), "{refused}");
+}
+
+/// The table of a run that is killed and restarted is that of one run; until it goes on, nothing of
+/// it is lost.
+#[test]
+fn a_history_goes_on_where_the_run_does() {
+    let (folder, case) = folder(CASE);
+    let at = |name: &str| folder.path().join(name);
+    let saving = Options {
+        steps: Some(7),
+        checkpoint: Some((at("flow.state"), 5.try_into().unwrap())),
+        history: Some(at("history.csv")),
+        ..headless(&case)
+    };
+    run(&saving);
+    // A line of a step behind the state, and one that was being written.
+    let table = std::fs::read_to_string(at("history.csv")).unwrap();
+    std::fs::write(at("history.csv"), format!("{table}8,0.4,0,0,0,99\n1")).unwrap();
+    let torn = std::fs::read_to_string(at("history.csv")).unwrap();
+    let further = Options { steps: Some(12), restart: Some(at("flow.state")), ..saving.clone() };
+    drop(Run::new(&further).unwrap());
+    assert_eq!(std::fs::read_to_string(at("history.csv")).unwrap(), torn);
+    run(&further);
+    let whole = std::fs::read_to_string(at("history.csv")).unwrap();
+    assert!(whole.starts_with(&table), "{whole}");
+    let lines: Vec<Vec<f64>> = whole
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|value| value.parse().unwrap()).collect())
+        .collect();
+    assert!(lines.iter().zip(1..).all(|(line, cycle)| line[0] == f64::from(cycle)), "{whole}");
+    assert!(lines.len() == 12 && lines.is_sorted_by_key(|line| line[5]), "{whole}");
+    // Nor is a table lost to a run that does not begin.
+    drop(Run::new(&Options { history: Some(at("history.csv")), ..headless(&case) }).unwrap());
+    assert_eq!(std::fs::read_to_string(at("history.csv")).unwrap(), whole);
+}
+
+#[test]
+#[cfg(not(feature = "distributed"))]
+fn processes_that_do_not_know_of_each_other_are_refused() {
+    let (_folder, case) = folder(CASE);
+    let started_by = |name: &str, value: &str| {
+        let mut flow = std::process::Command::new(env!("CARGO_BIN_EXE_flow"));
+        flow.arg("--case").arg(&case).args(["--headless", "--steps", "1"]);
+        for other in ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS", "PMIX_RANK"] {
+            flow.env_remove(other);
+        }
+        let output = flow.env(name, value).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).contains("started on several ranks");
+        assert!(output.status.success() != told, "{output:?}");
+        told
+    };
+    assert!(started_by("PMIX_RANK", "1") && started_by("SLURM_STEP_NUM_TASKS", "2"));
+    assert!(!started_by("PMIX_RANK", "0") && !started_by("OMPI_COMM_WORLD_SIZE", "1"));
+}
+
+#[test]
+fn the_state_at_the_end_is_saved_too() {
+    let (folder, case) = folder(CASE);
+    let state = folder.path().join("flow.state");
+    let saving = Options {
+        steps: Some(7),
+        checkpoint: Some((state.clone(), 3.try_into().unwrap())),
+        ..headless(&case)
+    };
+    assert_eq!(run(&saving).cycles, 7);
+    // As many steps have been done before this one begins.
+    let again = Options { steps: Some(1), restart: Some(state.clone()), ..headless(&case) };
+    let report = run(&again);
+    assert_eq!((report.cycles, report.error.as_deref()), (7, None));
+    // Among the coordinates.
+    let mut damaged = std::fs::read(&state).unwrap();
+    damaged[1000] ^= 4;
+    std::fs::write(&state, damaged).unwrap();
+    let refused = Run::new(&again).err().unwrap().to_string();
+    assert!(refused.contains("flow.state") && refused.contains("damaged"), "{refused}");
+}
+
+#[test]
+fn the_file_of_the_report_is_made_with_its_folder_or_refused_by_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("new/report.json");
+    let make = |file: &Path| -> Vec<Option<String>> {
+        threads::run(2, |ranks| make_file(&ranks, file).err().map(|error| error.to_string()))
+    };
+    assert_eq!(make(&report), [None, None]);
+    // What a run before has left is not taken for the report of one that comes to no end.
+    std::fs::write(&report, "{}").unwrap();
+    assert_eq!(make(&report), [None, None]);
+    assert_eq!(std::fs::read_to_string(&report).unwrap(), "");
+    let refused = make(&report.join("report.json"));
+    assert!(
+        refused[0] == refused[1]
+            && refused[0].as_ref().is_some_and(|it| it.contains("report.json/report.json")),
+        "{refused:?}"
+    );
 }
 
 #[test]

@@ -27,7 +27,8 @@ typedef struct
 /* A unit box, cold but for the side x = 0, which is kept at 1; the side x = 1 is kept at 0. */
 heat heat_create(MPI_Comm ranks, int cells);
 void heat_destroy(heat* self);
-/* One step on the mesh as it lies, which moves at `velocity` meanwhile. The caller moves the coordinates. */
+/* One step on the mesh as it lies, which moves at `velocity` meanwhile. The caller moves the coordinates.
+ * Small tetrahedra make it several shorter steps. */
 void heat_step(heat* self, double conductivity, double time_step);
 /* Of the whole box. */
 double heat_volume(const heat* self);

@@ -5,6 +5,7 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -40,6 +41,42 @@ public:
   // One step on the mesh as it lies, which moves at `velocity` meanwhile. The caller moves the coordinates.
   void step(double conductivity, double timeStep)
   {
+    // Explicit steps are stable up to a length that the smallest tetrahedron sets: a step is taken in as many parts as that needs.
+    double own = 0.0, smallest = 0.0;
+    for (std::size_t t = 0; t < connectivity.size(); t += 4)
+    {
+      Gradients gradient;
+      gradients(connectivity.data() + t, gradient);
+      double squares = 0.0;
+      for (const auto& one : gradient)
+        for (double slope : one) squares += slope * slope;
+      own = std::max(own, squares);
+    }
+    MPI_Allreduce(&own, &smallest, 1, MPI_DOUBLE, MPI_MAX, ranks);
+    const int parts = 1 + static_cast<int>(2.0 * conductivity * timeStep * smallest);
+    for (int part = 0; part < parts; ++part) partOfStep(conductivity, timeStep / parts);
+  }
+
+  // Of the whole box.
+  double volume() const { return total(false); }
+  double mean() const { return total(true) / total(false); }
+
+  MPI_Comm ranks;
+  int rank = 0, size = 1;
+  int cells;
+  std::vector<double> coordinates;         // x y z for each vertex
+  std::vector<double> temperature;         // one for each vertex
+  std::vector<double> velocity;            // of the mesh, x y z for each vertex; 0 where it rests
+  std::vector<std::int32_t> connectivity;  // four vertices for each tetrahedron
+  std::vector<std::int32_t> triangles;     // three vertices for each face of the box
+  std::vector<std::int32_t> features;      // 1 to 6 for each face: x-min, x-max, y-min, y-max, z-min, z-max
+  std::vector<std::int64_t> numbers;       // of the vertices in the whole box
+
+private:
+  using Gradients = std::array<std::array<double, 3>, 4>;
+
+  void partOfStep(double conductivity, double timeStep)
+  {
     std::vector<double> mass(temperature.size()), rate(temperature.size());
     for (std::size_t t = 0; t < connectivity.size(); t += 4)
     {
@@ -70,24 +107,6 @@ public:
       if (i > 0 && i < cells) temperature[v] += timeStep * rate[v] / mass[v];
     }
   }
-
-  // Of the whole box.
-  double volume() const { return total(false); }
-  double mean() const { return total(true) / total(false); }
-
-  MPI_Comm ranks;
-  int rank = 0, size = 1;
-  int cells;
-  std::vector<double> coordinates;         // x y z for each vertex
-  std::vector<double> temperature;         // one for each vertex
-  std::vector<double> velocity;            // of the mesh, x y z for each vertex; 0 where it rests
-  std::vector<std::int32_t> connectivity;  // four vertices for each tetrahedron
-  std::vector<std::int32_t> triangles;     // three vertices for each face of the box
-  std::vector<std::int32_t> features;      // 1 to 6 for each face: x-min, x-max, y-min, y-max, z-min, z-max
-  std::vector<std::int64_t> numbers;       // of the vertices in the whole box
-
-private:
-  using Gradients = std::array<std::array<double, 3>, 4>;
 
   int begin(int of) const { return static_cast<int>(static_cast<long>(cells) * of / size); }
 

@@ -3,7 +3,7 @@ module mpi
   implicit none
   ! No handle of MPI's: whoever gets it takes all ranks there are.
   integer, parameter :: MPI_COMM_WORLD = -1
-  integer, parameter :: MPI_DOUBLE_PRECISION = 0, MPI_SUM = 0, MPI_STATUS_SIZE = 1
+  integer, parameter :: MPI_DOUBLE_PRECISION = 0, MPI_SUM = 0, MPI_MAX = 1, MPI_STATUS_SIZE = 1
   integer :: MPI_STATUS_IGNORE(MPI_STATUS_SIZE)
 
 contains

@@ -4,14 +4,34 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::dot;
 
 use super::Solver;
-use crate::boundary::Patch;
+use crate::boundary::{Condition, Patch};
 use crate::fluid::Fluid;
 use crate::geometry::Element;
-use crate::ranks::largest;
+use crate::linear::sum;
+use crate::ranks::{largest, total};
 
 impl Solver {
     pub(super) fn imbalance(&self) -> f64 {
         self.fluxes().into_iter().sum()
+    }
+
+    /// The volume of the mesh. Collective.
+    pub(super) fn volume(&self) -> f64 {
+        let volumes = &self.geometry.vertex_volumes;
+        let own = sum(self.topology.rows(), |range| [volumes[range].iter().sum::<f64>()]);
+        total(self.halo.communicator(), own)[0]
+    }
+
+    /// The part of its volume by which the fluid was stretched in the last step. Collective.
+    pub(super) fn stretch(&self, time_step: f64) -> f64 {
+        if self.boundary.is_open() {
+            return 0.0;
+        }
+        let patches = self.boundary.patches.iter().zip(self.fluxes());
+        let prescribed =
+            patches.filter(|(patch, _)| matches!(patch.condition, Condition::Velocity(_)));
+        let out: f64 = prescribed.map(|(_, flux)| flux * time_step).sum();
+        (self.gain + out) / self.volume()
     }
 
     /// How many steps have been done.

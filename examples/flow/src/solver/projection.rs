@@ -15,6 +15,17 @@ use crate::linear::{Outcome, sum};
 use crate::ranks::total;
 use crate::topology::Topology;
 
+/// What a solve begins with, which says how many iterations are usual.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Start {
+    /// Nothing, as one of the projections of an impulse.
+    Impulse,
+    /// Nothing, in a step behind an impulse.
+    Zero,
+    /// The solution of the step before.
+    Last,
+}
+
 /// The pressure equation.
 #[derive(Debug)]
 pub(super) struct Projection {
@@ -23,8 +34,9 @@ pub(super) struct Projection {
     is_stale: bool,
     /// Whether the solves take many more iterations for that.
     is_worn: bool,
-    /// How many iterations a solve takes at most with a fresh preconditioner.
-    usual_iterations: usize,
+    /// How many iterations a solve of each [`Start`] takes at most with a fresh preconditioner; 0
+    /// where there was none.
+    usual_iterations: [usize; 3],
     /// Where the mesh lay when the preconditioner was set up; `None` where that was at the beginning.
     set_up_at: Option<Vec<Vector>>,
     /// Of this rank: zero at the vertices of others.
@@ -49,7 +61,7 @@ impl Projection {
             solver,
             is_stale: false,
             is_worn: false,
-            usual_iterations: 0,
+            usual_iterations: [0; 3],
             set_up_at: None,
             right,
         })
@@ -74,6 +86,15 @@ impl Projection {
         Ok(())
     }
 
+    /// Sets the preconditioner up for the shape at which the mesh has come to rest, where it was for
+    /// another: what it saves is saved in every step to come. Collective.
+    pub(super) fn settle(&mut self, points: &[Vector]) {
+        if self.is_stale && self.refresh(self.solver.matrix(), points).is_err() {
+            // The old one serves, and is not to be tried again in every step.
+            self.is_stale = false;
+        }
+    }
+
     /// Sets the preconditioner up for this matrix. Collective.
     fn refresh(
         &mut self,
@@ -82,30 +103,37 @@ impl Projection {
     ) -> Result<(), LinearError> {
         self.solver = self.solver.of_like_matrix(matrix)?;
         self.set_up_at = Some(points.to_vec());
-        (self.is_stale, self.is_worn, self.usual_iterations) = (false, false, 0);
+        (self.is_stale, self.is_worn, self.usual_iterations) = (false, false, [0; 3]);
         Ok(())
     }
 
     /// Writes down what is not in the matrix.
-    pub(super) fn save(&self, writer: &mut Writer) {
+    pub(super) fn save(&self, writer: &mut Writer, topology: &Topology) {
         writer.u8(self.is_stale.into());
         writer.u8(self.is_worn.into());
-        writer.u64(self.usual_iterations as u64);
+        self.usual_iterations.iter().for_each(|&usual| writer.u64(usual as u64));
         writer.u8(self.set_up_at.is_some().into());
-        self.set_up_at.iter().for_each(|points| writer.f64s(points.as_flattened()));
+        if let Some(points) = &self.set_up_at {
+            writer.f64s(topology.to_mesh(points).as_flattened());
+        }
     }
 
     /// Reads what was written down; where the mesh lay when the preconditioner was set up.
     pub(super) fn read(
         &mut self,
         reader: &mut Reader<'_>,
-        vertices: usize,
+        topology: &Topology,
     ) -> Result<Option<Vec<Vector>>, Garbled> {
         (self.is_stale, self.is_worn) = (reader.u8()? != 0, reader.u8()? != 0);
-        self.usual_iterations = reader.count(0)?;
+        for usual in &mut self.usual_iterations {
+            *usual = reader.count(0)?;
+        }
         self.set_up_at = match reader.u8()? {
             0 => None,
-            _ => Some(reader.f64s(3 * vertices)?.as_chunks().0.to_vec()),
+            _ => {
+                let points = reader.f64s(3 * topology.vertex_count())?;
+                Some(topology.to_solver(points.as_chunks().0))
+            }
         };
         Ok(self.set_up_at.clone())
     }
@@ -121,12 +149,14 @@ impl Projection {
         self.solver = self.solver.of_similar_matrix(matrix);
     }
 
-    /// Counts the iterations of a solve, to see whether the preconditioner still serves.
-    fn count(&mut self, iterations: usize) {
-        if self.is_stale {
-            self.is_worn = iterations > self.usual_iterations + self.usual_iterations / 2 + 2;
-        } else {
-            self.usual_iterations = self.usual_iterations.max(iterations);
+    /// Counts the iterations of a solve, to see whether the preconditioner still serves: beside
+    /// solves that began alike.
+    fn count(&mut self, start: Start, iterations: usize) {
+        let usual = &mut self.usual_iterations[start as usize];
+        if !self.is_stale {
+            *usual = (*usual).max(iterations);
+        } else if *usual > 0 {
+            self.is_worn = iterations > *usual + *usual / 2 + 2;
         }
     }
 
@@ -139,7 +169,8 @@ impl Projection {
         halo: &Halo,
         potential: &mut [f64],
         points: &[Vector],
-        pressure_tolerance: f64,
+        start: Start,
+        relative: f64,
         through: f64,
         open: bool,
     ) -> Outcome {
@@ -158,8 +189,7 @@ impl Projection {
         let size = square.sqrt();
         let small = 1e-9 * through / used.max(1.0).sqrt();
         // The residual is a loss of mass, and as such says alone what is good enough.
-        let tolerance =
-            Tolerance { relative: 0.0, absolute: (pressure_tolerance * size).max(small) };
+        let tolerance = Tolerance { relative: 0.0, absolute: (relative * size).max(small) };
         if self.is_worn && self.refresh(self.solver.matrix(), points).is_err() {
             // The old one has served so far, if slowly.
             self.is_worn = false;
@@ -176,7 +206,7 @@ impl Projection {
             }
             Err(_) => Outcome { iterations: 0, residual: size, converged: false },
         };
-        self.count(outcome.iterations);
+        self.count(start, outcome.iterations);
         outcome
     }
 }

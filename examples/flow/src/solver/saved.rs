@@ -6,18 +6,13 @@ use tombolo_deform::communicator::{Garbled, Reader, Writer};
 use tombolo_deform::mesh::Vector;
 
 use super::Solver;
+use super::checks::check_elements;
 use super::projection::pressure_matrix;
 use crate::SolverError;
 use crate::geometry::Geometry;
 use crate::ranks::agreed;
 
 impl Solver {
-    /// The parameters that boundary values may depend on.
-    #[must_use]
-    pub fn parameters(&self) -> &[f64] {
-        &self.parameters
-    }
-
     /// Writes down all that the steps to come depend on, of this rank's part.
     pub fn save(&self, writer: &mut Writer) {
         writer.u64(self.cycle);
@@ -26,29 +21,36 @@ impl Solver {
         writer.f64s(&self.parameters);
         writer.u8(self.moving.into());
         writer.u8(self.jump.into());
-        writer.u32(self.history_length);
+        writer.f64s(&[self.last_step]);
         let fluid = self.fluid;
         writer.f64s(&[fluid.density, fluid.viscosity]);
         writer.u64(self.velocity.len() as u64);
+        // In the mesh's numbering: the solver's own is nobody else's business.
         for vectors in
             [&self.geometry.points, &self.velocity, &self.previous_velocity, &self.mesh_velocity]
         {
-            writer.f64s(vectors.as_flattened());
+            writer.f64s(self.topology.to_mesh(vectors).as_flattened());
         }
-        writer.f64s(&self.pressure);
-        writer.f64s(&self.potential);
-        self.projection.save(writer);
+        writer.f64s(&self.topology.to_mesh(&self.pressure));
+        writer.f64s(&self.topology.to_mesh(&self.potential));
+        self.projection.save(writer, &self.topology);
     }
 
     /// Goes on from what [`Solver::save`] wrote on this rank, of the same mesh with the same patches;
     /// of a solver that was just made. Collective.
     ///
     /// # Errors
-    /// [`SolverError::Saved`] for a state of another mesh, and what a mesh there is refused for; the
-    /// same on all ranks.
+    /// [`SolverError::Saved`] for a state of another mesh, [`SolverError::Inverted`] for one that no
+    /// step has left so, and [`SolverError::Diverged`] for a flow that is not finite; on several ranks
+    /// [`SolverError::Rank`], the same on all.
     pub fn restore(&mut self, reader: &mut Reader<'_>) -> Result<(), SolverError> {
         let read = self.read(reader).map_err(|Garbled { .. }| SolverError::Saved);
+        let read = read.and_then(|worn| {
+            check_elements(&self.topology, &self.geometry, self.cycle)?;
+            Ok(worn)
+        });
         let worn = agreed(self.halo.communicator(), read)?;
+        self.check_finite()?;
         let communicator = self.halo.communicator();
         if let Some(points) = worn {
             // The preconditioner belongs to an earlier shape: it decides over the last bits.
@@ -73,22 +75,23 @@ impl Solver {
         }
         self.parameters = reader.f64s(count)?;
         (self.moving, self.jump) = (reader.u8()? != 0, reader.u8()? != 0);
-        self.history_length = reader.u32()?;
+        self.last_step = reader.f64s(1)?[0];
         let fluid = reader.f64s(2)?;
         (self.fluid.density, self.fluid.viscosity) = (fluid[0], fluid[1]);
         let vertices = self.velocity.len();
         if reader.count(0)? != vertices || self.fluid.check().is_err() {
             return Err(reader.garbled());
         }
+        let topology = &self.topology;
         let mut vectors = || -> Result<Vec<Vector>, Garbled> {
-            Ok(reader.f64s(3 * vertices)?.as_chunks().0.to_vec())
+            Ok(topology.to_solver(reader.f64s(3 * vertices)?.as_chunks().0))
         };
         let points = vectors()?;
         (self.velocity, self.previous_velocity, self.mesh_velocity) =
             (vectors()?, vectors()?, vectors()?);
         self.geometry = Geometry::new(&self.topology, points);
-        self.pressure = reader.f64s(vertices)?;
-        self.potential = reader.f64s(vertices)?;
-        self.projection.read(reader, vertices)
+        self.pressure = self.topology.to_solver(&reader.f64s(vertices)?);
+        self.potential = self.topology.to_solver(&reader.f64s(vertices)?);
+        self.projection.read(reader, &self.topology)
     }
 }
