@@ -157,9 +157,12 @@ function withoutLostEdit(state: State, next: State): State {
 
 function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
   const looks = looksOf(views, fields, state.looks);
+  const isColoured = (name: string): boolean => own(looks, name)?.field != null;
   const known = state.chosenView !== null && Object.hasOwn(looks, state.chosenView);
-  const coloured = views.find((view) => own(looks, view.name)?.field != null) ?? views[0];
-  return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known ? state.chosenView : coloured?.name ?? null };
+  // Before there were fields no view was worth more than another.
+  const isFirstChoice = fields.length > 0 && state.hello?.fields.length === 0 && !isColoured(state.chosenView ?? "");
+  const coloured = views.find(({ name }) => isColoured(name)) ?? views[0];
+  return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known && !isFirstChoice ? state.chosenView : coloured?.name ?? null };
 }
 
 function withSchema(state: State, form: State["form"], settings: Values): State {

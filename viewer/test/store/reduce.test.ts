@@ -3,6 +3,7 @@ import type { Json } from "../../src/connection/protocol";
 import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { looksOf, readLooks } from "../../src/store/looks";
 import { appliedOrders } from "../../src/store/orders";
 import { runState, slowLink, whyNotSteering } from "../../src/store/run";
 import { Selection } from "../../src/store/selection";
@@ -177,6 +178,37 @@ describe("orders that have changed the shape", () => {
     expect(appliedOrders(store.state)).toBe(list);
     tell("b", "applying", 1, 9);
     expect(appliedOrders(store.state).map(({ cycle }) => cycle)).toEqual([5, 9]);
+  });
+});
+
+describe("how views look", () => {
+  const VELOCITY = { name: "velocity", association: "vertex" as const, components: 3 };
+  const PRESSURE = { name: "pressure", association: "vertex" as const, components: 1 };
+  const CUT = { name: "cut", kind: "slice" }, SHELL = { name: "shell", kind: "surface" };
+
+  it("is by a field as soon as the run says which it has", () => {
+    const { store, greet } = page({ views: [SHELL, CUT] });
+    expect([store.state.looks.cut!.field, store.state.chosenView]).toEqual([null, "shell"]);
+    greet({ fields: [PRESSURE, VELOCITY] });
+    expect([store.state.looks.cut!.field, store.state.looks.shell!.field, store.state.chosenView]).toEqual(["velocity", null, "cut"]);
+    greet({ fields: [] });
+    expect(store.state.looks.cut!.field).toBe("velocity");
+    greet({ fields: [PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("pressure");
+  });
+
+  it("is by no field where somebody wants none, also after a reload", () => {
+    const { store, greet } = page({ views: [CUT] });
+    store.dispatch({ type: "look", view: "cut", look: { field: null } });
+    greet({ fields: [VELOCITY] });
+    expect(store.state.looks.cut!.field).toBeNull();
+    expect(looksOf([CUT], [VELOCITY], readLooks(JSON.parse(JSON.stringify(store.state.looks)))).cut!.field).toBeNull();
+  });
+
+  it("leaves the field open over a reload where only something else was chosen", () => {
+    const { store } = page({ views: [CUT] });
+    store.dispatch({ type: "look", view: "cut", look: { opacity: 0.5 } });
+    expect(looksOf([CUT], [VELOCITY], readLooks(JSON.parse(JSON.stringify(store.state.looks)))).cut).toMatchObject({ field: "velocity", opacity: 0.5 });
   });
 });
 
