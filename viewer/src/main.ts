@@ -64,6 +64,7 @@ import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
 import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
+import { fieldNamed, fieldsOf, sameFields } from "./store/fields";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
 import type { Look } from "./store/looks";
@@ -123,15 +124,15 @@ function canvasOfPage(): Canvas {
 }
 const selection = new Selection(store);
 const triad = new Triad();
-/** A field and its component in words. */
-const fieldTitle = (field: string | null, component: number): string =>
-  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
+/** A field and its component in words, as a view carries it. */
+const fieldTitle = (field: string | null, component: number, view: string | null = null): string =>
+  fieldText(field ?? "", fieldNamed(store.state, field, view)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
 /** The unit of a field; null where none is given. */
-const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
+const unitOf = (field: string | null): string | null => fieldNamed(store.state, field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
 const titleWithUnit = (field: string | null, component: number): string => withUnit(fieldTitle(field, component), unitOf(field));
 let shownBars: Bar[] = [];
-const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
+const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }) => ({ title: fieldTitle(field, component, views[0]), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
     const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
@@ -369,8 +370,10 @@ function takeHello({ stack: told, ...hello }: ToldHello): void {
 }
 
 function takeFrame(frame: Frame): void {
-  if (frame.kind === "topology") scene.setTopology(frame);
-  else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
+  if (frame.kind === "topology") return scene.setTopology(frame);
+  const fields = fieldsOf(frame);
+  if (!sameFields(own(store.state.carried, frame.view), fields)) store.dispatch({ type: "carries", view: frame.view, fields });
+  if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
 store.watch((state) => state.hello, (hello) => {

@@ -1,5 +1,4 @@
 /** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
-import type { FieldInformation } from "../connection/protocol";
 import { element, identifier, write } from "../dom";
 import { digits, readNumber, words } from "../number";
 import { own } from "../own";
@@ -7,12 +6,13 @@ import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/col
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
 import type { Bar } from "../picture/scene";
 import type { Action } from "../store/actions";
+import { choicesOf, fieldNamed } from "../store/fields";
 import { EDGES } from "../store/looks";
 import type { Look } from "../store/looks";
 import { QUALITY } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
-import { sameJson } from "../store/store";
+import { sameParts } from "../store/store";
 import type { Store } from "../store/store";
 
 const RANGES: readonly [RangeKind, string][] = [["auto", "of each frame"], ["over time", "of all frames so far"], ["fixed", "fixed"]];
@@ -55,7 +55,7 @@ export class LookPanel {
       this.quality.disabled = why !== "";
       this.quality.title = why === "" ? "Has the quality of the cells streamed with this view" : why;
     });
-    store.watch((state) => [state.looks, state.chosenView, state.hello?.fields], () => this.show(), sameJson);
+    store.watch((state) => [state.looks, state.chosenView, state.hello?.fields, state.carried], () => this.show(), sameParts);
   }
 
   /** What the colours of the picture stand for now. */
@@ -111,18 +111,21 @@ export class LookPanel {
 
   private show(): void {
     const { look } = this;
-    const { chosenView, hello } = this.store.state;
+    const { state } = this.store;
+    const { chosenView } = state;
     this.rows.hidden = look === null;
     write(this.heading, chosenView === null ? "Look" : `Look of ${chosenView}`);
-    if (!look) return;
-    const fields: readonly FieldInformation[] = hello?.fields ?? [];
-    // One that the library adds to a view is not among those of the solver.
-    const names = [...new Set([...fields.map(({ name }) => name), ...(look.field === null ? [] : [look.field])])];
-    fill(this.field, [...names.map((name): [string, string] => [name, own(FIELD_TITLES, name) ?? words(name)]), ["", "none"]]);
-    write(this.unit, fields.find(({ name }) => name === look.field)?.unit ?? "");
+    if (!look || chosenView === null) return;
+    const choices = choicesOf(state, chosenView);
+    // One that was asked for has not come yet.
+    if (look.field !== null && !choices.some(({ name }) => name === look.field)) choices.push({ name: look.field, isCarried: false });
+    const title = (name: string): string => own(FIELD_TITLES, name) ?? words(name);
+    fill(this.field, [...choices.map(({ name, isCarried }): Choice => (isCarried ? [name, title(name)] : [name, `${title(name)} (not in this view)`, true])), ["", "none"]]);
+    const field = fieldNamed(state, look.field, chosenView);
+    write(this.unit, field?.unit ?? "");
     this.field.value = look.field ?? "";
-    const count = fields.find((field) => field.name === look.field)?.components ?? 1;
-    fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): [string, string] => [String(i), name])] : []);
+    const count = field?.components ?? 1;
+    fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): Choice => [String(i), name])] : []);
     this.component.value = String(look.component);
     this.component.hidden = count <= 1;
     this.map.value = look.map;
@@ -149,9 +152,12 @@ export class LookPanel {
 /** What a field that has a name of the library's own is called on the page. */
 export const FIELD_TITLES: Readonly<Record<string, string>> = { [QUALITY]: "mesh quality" };
 
-function fill(select: HTMLSelectElement, options: readonly [string, string][]): void {
-  const key = JSON.stringify(options);
+/** A choice of a list: its value, its text, and whether it cannot be taken. */
+type Choice = readonly [value: string, text: string, disabled?: boolean];
+
+function fill(select: HTMLSelectElement, choices: readonly Choice[]): void {
+  const key = JSON.stringify(choices);
   if (select.dataset.options === key) return;
   select.dataset.options = key;
-  select.replaceChildren(...options.map(([value, text]) => option(value, text)));
+  select.replaceChildren(...choices.map(([value, text, disabled = false]) => element("option", { value, disabled }, text)));
 }

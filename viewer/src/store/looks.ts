@@ -24,30 +24,36 @@ export interface Look {
 
 export type Looks = Readonly<Record<string, Look>>;
 
+/** The fields that views carry, by the name of the view; of one that has had no frame yet nobody knows. */
+export type Carried = Readonly<Record<string, readonly FieldInformation[]>>;
+
 const RANGE: RangeChoice = { kind: "auto", low: 0, high: 1, symmetric: false, logarithmic: false };
 
 /** How a view looks at first. A surface that hides what is inside it is of little use: it is a shell of glass then. */
-export function firstLook(view: ViewInformation, views: readonly ViewInformation[], fields: readonly FieldInformation[]): Look {
+function firstLook(view: ViewInformation, views: readonly ViewInformation[]): Look {
   const isShell = view.kind === "surface" && views.some((other) => other.kind !== "surface");
-  return withOpenField({
+  return {
     visible: true, opacity: isShell ? 0.15 : 1, edges: "features", field: null, isFieldOpen: !isShell, component: -1,
     map: COLOUR_MAPS[0]!.name, range: RANGE,
-  }, fields);
+  };
 }
 
-/** A look whose field nobody has chosen, by the fields that there are: the first vector, else the first of all. */
-function withOpenField(look: Look, fields: readonly FieldInformation[]): Look {
-  if (!look.isFieldOpen || fields.length === 0 || fields.some(({ name }) => name === look.field)) return look;
-  const field = fields.find(({ components }) => components === 3) ?? fields[0]!;
+/**
+ * A look whose field nobody has chosen, by the fields that there are: the first vector, else the first of all. Where it is known what the
+ * view carries, it is one of those.
+ */
+function withOpenField(look: Look, fields: readonly FieldInformation[], carried: readonly FieldInformation[] | undefined): Look {
+  const has = (list: readonly FieldInformation[], name: string | null): boolean => list.some((field) => field.name === name);
+  // Those of the solver come before what is made of them.
+  const there = carried ? [...carried.filter(({ name }) => has(fields, name)), ...carried.filter(({ name }) => !has(fields, name))] : fields;
+  if (!look.isFieldOpen || there.length === 0 || has(there, look.field)) return look;
+  const field = there.find(({ components }) => components === 3) ?? there[0]!;
   return { ...look, field: field.name, component: -1 };
 }
 
 /** The looks of the views that there are now: those that are new look as they do at first, the others as they did. */
-export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks): Looks {
-  return Object.fromEntries(views.map((view) => {
-    const known = own(before, view.name);
-    return [view.name, known ? withOpenField(known, fields) : firstLook(view, views, fields)];
-  }));
+export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks, carried: Carried = {}): Looks {
+  return Object.fromEntries(views.map((view) => [view.name, withOpenField(own(before, view.name) ?? firstLook(view, views), fields, own(carried, view.name))]));
 }
 
 /** The looks with some of one view's, or of all, another. */

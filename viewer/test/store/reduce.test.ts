@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { Json } from "../../src/connection/protocol";
+import type { FieldInformation, Json } from "../../src/connection/protocol";
 import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
@@ -203,6 +203,30 @@ describe("how views look", () => {
     greet({ fields: [VELOCITY] });
     expect(store.state.looks.cut!.field).toBeNull();
     expect(looksOf([CUT], [VELOCITY], readLooks(JSON.parse(JSON.stringify(store.state.looks)))).cut!.field).toBeNull();
+  });
+
+  it("is by a field that the view carries, where nobody has chosen one", () => {
+    const { store, greet } = page({ views: [CUT], fields: [PRESSURE, VELOCITY] });
+    const carries = (...fields: FieldInformation[]): string | null => {
+      store.dispatch({ type: "carries", view: "cut", fields });
+      return store.state.looks.cut!.field;
+    };
+    expect(store.state.looks.cut!.field).toBe("velocity");
+    expect(carries(PRESSURE)).toBe("pressure");
+    const vorticity = { name: "vorticity", association: "vertex" as const, components: 3 };
+    expect(carries(PRESSURE, vorticity)).toBe("pressure");
+    expect(carries({ ...PRESSURE, name: "quality" }, vorticity)).toBe("vorticity");
+    greet({});
+    expect(store.state.looks.cut!.field).toBe("vorticity");
+    store.dispatch({ type: "look", view: "cut", look: { field: "vorticity" } });
+    expect(carries(VELOCITY)).toBe("vorticity");
+  });
+
+  it("may be told by a frame before the run has said which views there are", () => {
+    const { store, greet } = page();
+    store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
+    greet({ views: [CUT], fields: [VELOCITY, PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("pressure");
   });
 
   it("leaves the field open over a reload where only something else was chosen", () => {
