@@ -3,6 +3,8 @@ import uPlot from "uplot";
 import type { Pipelines } from "../connection/pipelines";
 import type { DataFrame, Vector } from "../connection/protocol";
 import { download, element, write } from "../dom";
+import { exactCell } from "../exact";
+import type { ExactCell } from "../exact";
 import { digits, readNumber } from "../number";
 import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
@@ -31,7 +33,7 @@ export class LinePlot extends ValuePlot {
   readonly title = "Line";
   readonly tools: readonly HTMLElement[];
   private readonly note = element("p", { class: "hint" });
-  private readonly ends: Record<"from" | "to", HTMLInputElement[]>;
+  private readonly ends: Record<"from" | "to", { input: HTMLInputElement; cell: ExactCell }[]>;
   private readonly remove: HTMLButtonElement;
   private readonly csv: HTMLButtonElement;
   private shape = "";
@@ -44,10 +46,12 @@ export class LinePlot extends ValuePlot {
     private readonly earlier: Earlier, private readonly changed: () => void,
   ) {
     super(store, REST);
-    const inputs = (label: string): HTMLInputElement[] => ["x", "y", "z"].map((axis) =>
-      element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, placeholder: axis, onchange: () => this.typed() }));
+    const inputs = (label: string): { input: HTMLInputElement; cell: ExactCell }[] => ["x", "y", "z"].map((axis) => {
+      const input = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, placeholder: axis, onchange: () => this.typed() });
+      return { input, cell: exactCell(input) };
+    });
     this.ends = { from: inputs("from"), to: inputs("to") };
-    const row = (label: "from" | "to"): HTMLElement => element("div", { class: "ends" }, element("span", {}, label), ...this.ends[label]);
+    const row = (label: "from" | "to"): HTMLElement => element("div", { class: "ends" }, element("span", {}, label), ...this.ends[label].map(({ input }) => input));
     this.csv = element("button", { type: "button", class: "small", title: "What is plotted, as comma-separated values", onclick: () => this.download() }, "CSV");
     this.remove = element("button", { type: "button", class: "small", title: "Takes the line away", onclick: () => pipelines.remove(LINE) }, "Remove");
     this.tools = [this.heading, this.csv, this.remove];
@@ -80,7 +84,7 @@ export class LinePlot extends ValuePlot {
     const line = lineOf(this.pipelines.get(LINE));
     this.line = line;
     for (const end of ["from", "to"] as const) {
-      this.ends[end].forEach((input, k) => { if (line && document.activeElement !== input) input.value = digits(line[end][k], 5); });
+      this.ends[end].forEach(({ input, cell }, k) => { if (line && document.activeElement !== input) cell.write(line[end][k]!, digits(line[end][k], 6)); });
     }
     this.say();
     this.changed();
@@ -89,7 +93,7 @@ export class LinePlot extends ValuePlot {
 
   private say(): void {
     const why = whyNotSteering(this.store.state);
-    for (const control of [...this.ends.from, ...this.ends.to]) control.disabled = why !== "";
+    for (const { input } of [...this.ends.from, ...this.ends.to]) input.disabled = why !== "";
     this.remove.disabled = why !== "" || this.line === null;
     this.csv.disabled = this.line === null;
     write(this.note, this.line === null ? "Choose Line in the toolbar and click two places of the picture; or type two points." : why === "" ? "" : `The line is where the run takes it. ${why}`);
@@ -97,8 +101,8 @@ export class LinePlot extends ValuePlot {
   }
 
   private typed(): void {
-    const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map((input) => {
-      const value = readNumber(input.value);
+    const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map(({ input, cell }) => {
+      const value = cell.untouched() ?? readNumber(input.value);
       input.setAttribute("aria-invalid", String(value === null && input.value !== ""));
       return value;
     });

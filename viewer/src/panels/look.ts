@@ -1,6 +1,7 @@
 /** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
 import { element, identifier, write } from "../dom";
-import { digits, readNumber, words } from "../number";
+import { exactCell } from "../exact";
+import { readNumber, within, words } from "../number";
 import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
@@ -28,6 +29,7 @@ export class LookPanel {
   private readonly kind = element("select", { onchange: () => this.changeKind(this.kind.value as RangeKind) }, ...RANGES.map(([kind, text]) => option(kind, text)));
   private readonly low = this.end("lowest value");
   private readonly high = this.end("highest value");
+  private readonly ends = [this.low, this.high].map((input) => [input, exactCell(input)] as const);
   private readonly unit = element("span", { class: "unit" });
   private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.changeRange({ symmetric: this.symmetric.checked, logarithmic: false }) });
   private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
@@ -103,7 +105,7 @@ export class LookPanel {
 
   /** A number typed at either end fixes the range. */
   private typed(): void {
-    const [low, high] = [readNumber(this.low.value), readNumber(this.high.value)];
+    const [low, high] = this.ends.map(([input, cell]) => cell.untouched() ?? readNumber(input.value)) as [number | null, number | null];
     const wrong = { low: low === null, high: high === null || (low !== null && high <= low) };
     for (const [input, bad] of [[this.low, wrong.low], [this.high, wrong.high]] as const) input.setAttribute("aria-invalid", String(bad));
     if (low !== null && high !== null && low < high) this.changeRange({ kind: "fixed", low, high });
@@ -141,11 +143,12 @@ export class LookPanel {
   private showEnds(): void {
     const { look } = this;
     const range: Range | null = look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
-    for (const [input, value] of [[this.low, range?.[0]], [this.high, range?.[1]]] as const) {
-      if (document.activeElement === input) continue;
-      input.value = value === undefined ? "" : digits(value, 5);
+    this.ends.forEach(([input, cell], i) => {
+      if (document.activeElement === input) return;
+      if (range) cell.write(range[i]!, within(range[i]!, look?.range.logarithmic ? [0, range[i]!] : range));
+      else cell.write(null, "");
       input.removeAttribute("aria-invalid");
-    }
+    });
   }
 }
 

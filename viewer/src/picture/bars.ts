@@ -1,5 +1,7 @@
 /** The scalar bars: what the colours in the picture stand for. A number typed at the end of one fixes its range. */
 import { element, write } from "../dom";
+import { exactCell } from "../exact";
+import type { ExactCell } from "../exact";
 import { readNumber, within, words } from "../number";
 import { colourMap, componentNames, gradient } from "./colour";
 import { valueAt } from "./ranges";
@@ -12,7 +14,7 @@ const TICKS = 6;
 export interface BarText { title: string; unit: string | null }
 
 export class ScalarBars {
-  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; range: Range; typed: (range: Range) => void }>();
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; cells: ExactCell[]; range: Range; typed: (range: Range) => void }>();
 
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
@@ -30,13 +32,13 @@ export class ScalarBars {
 
   private update(bar: Bar): void {
     const shown = this.shown.get(bar.key) ?? this.make(bar);
-    const { ticks, ends } = shown;
+    const { ticks, ends, cells } = shown;
     shown.range = bar.range;
     shown.typed = (range) => this.fix(bar.views, range);
     const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
     ticks.forEach((tick, i) => write(tick, at(i + 1)));
     ends.forEach((input, i) => {
-      if (document.activeElement !== input) input.value = at(i === 0 ? TICKS - 1 : 0);
+      if (document.activeElement !== input) cells[i]!.write(bar.range[i]!, at(i === 0 ? TICKS - 1 : 0));
     });
   }
 
@@ -44,18 +46,19 @@ export class ScalarBars {
     const { title, unit } = this.describe(bar);
     const end = (label: string): HTMLInputElement => element("input", {
       type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${title}: ${label}`, title: "Type a number to fix the range", onchange: () => {
-        const [low, high] = [readNumber(ends[0].value) ?? shown.range[0], readNumber(ends[1].value) ?? shown.range[1]];
+        const [low, high] = ends.map((input, i) => cells[i]!.untouched() ?? readNumber(input.value) ?? shown.range[i]!) as Range;
         if (low < high) shown.typed([low, high]);
       },
     });
     const ends: [HTMLInputElement, HTMLInputElement] = [end("lowest value"), end("highest value")];
+    const cells = ends.map(exactCell);
     const ticks = Array.from({ length: TICKS - 2 }, () => element("li"));
     const colours = element("div", { class: "colours" });
     colours.style.background = gradient(colourMap(bar.look.map), "to top");
     const root = element("div", { class: "scalar-bar", role: "group", "aria-label": title }, element("div", { class: "title" }, title, unit ? element("small", {}, unit) : null),
       element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))));
     this.root.append(root);
-    const shown = { root, ticks, ends, range: bar.range, typed: (_: Range): void => undefined };
+    const shown = { root, ticks, ends, cells, range: bar.range, typed: (_: Range): void => undefined };
     this.shown.set(bar.key, shown);
     return shown;
   }

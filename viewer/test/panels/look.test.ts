@@ -47,6 +47,26 @@ describe("the look of a view", () => {
     expect(fieldNamed(store.state, "constructor", "toString")).toBeNull();
   });
 
+  it("has a range of which one end is typed, and the other stays as it is to the last bit", () => {
+    const bar = (range: [number, number]): void => panel.setBars([{ key: "", look: made.store.state.looks.cut!, range, views: ["cut"] }]);
+    const type = (label: string, text: string): unknown => {
+      const input = root().querySelector<HTMLInputElement>(`[aria-label="${label}"]`)!;
+      input.value = text;
+      input.dispatchEvent(new Event("change"));
+      return made.store.state.looks.cut!.range;
+    };
+    const texts = (): string[] => [...root().querySelectorAll<HTMLInputElement>('input[type="text"]')].map(({ value }) => value);
+    bar([101325.01, 101325.09]);
+    expect(texts()).toEqual(["101325.01", "101325.09"]);
+    expect(type("highest value", "101326")).toMatchObject({ kind: "fixed", low: 101325.01, high: 101326 });
+    made.store.dispatch({ type: "look", view: "cut", look: { range: { ...made.store.state.looks.cut!.range, kind: "auto" } } });
+    bar([1 / 3, 2e5 / 3]);
+    expect(type("highest value", "70000")).toMatchObject({ low: 1 / 3, high: 70000 });
+    expect(type("lowest value", "1")).toMatchObject({ low: 1, high: 70000 });
+    made.store.dispatch({ type: "look", view: "cut", look: { range: { kind: "fixed", low: 1.234e-5, high: 1, logarithmic: true, symmetric: false } } });
+    expect(texts()).toEqual(["1.23e−5", "1"]);
+  });
+
   it("is told only where a frame carries something else", () => {
     const known = fieldsOf({ fields: [array("p", 1), array("p", 3)] });
     const of = (...fields: ReturnType<typeof array>[]): boolean => sameFields(known, fieldsOf({ fields }));
