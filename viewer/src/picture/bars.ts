@@ -14,7 +14,7 @@ const TICKS = 6;
 export interface BarText { title: string; unit: string | null }
 
 export class ScalarBars {
-  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; cells: ExactCell[]; range: Range; typed: (range: Range) => void }>();
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; cells: ExactCell[]; range: Range; typed: (range: Range) => void; name: (text: BarText) => void }>();
 
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
@@ -35,6 +35,7 @@ export class ScalarBars {
     const { ticks, ends, cells } = shown;
     shown.range = bar.range;
     shown.typed = (range) => this.fix(bar.views, range);
+    shown.name(this.describe(bar));
     const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
     ticks.forEach((tick, i) => write(tick, at(i + 1)));
     ends.forEach((input, i) => {
@@ -43,22 +44,30 @@ export class ScalarBars {
   }
 
   private make(bar: Bar): NonNullable<ReturnType<typeof this.shown.get>> {
-    const { title, unit } = this.describe(bar);
-    const end = (label: string): HTMLInputElement => element("input", {
-      type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${title}: ${label}`, title: "Type a number to fix the range", onchange: () => {
+    const end = (): HTMLInputElement => element("input", {
+      type: "text", inputmode: "decimal", autocomplete: "off", title: "Type a number to fix the range", onchange: () => {
         const [low, high] = ends.map((input, i) => cells[i]!.untouched() ?? readNumber(input.value) ?? shown.range[i]!) as Range;
         if (low < high) shown.typed([low, high]);
       },
     });
-    const ends: [HTMLInputElement, HTMLInputElement] = [end("lowest value"), end("highest value")];
+    const ends: [HTMLInputElement, HTMLInputElement] = [end(), end()];
     const cells = ends.map(exactCell);
     const ticks = Array.from({ length: TICKS - 2 }, () => element("li"));
     const colours = element("div", { class: "colours" });
     colours.style.background = gradient(colourMap(bar.look.map), "to top");
-    const root = element("div", { class: "scalar-bar", role: "group", "aria-label": title }, element("div", { class: "title" }, title, unit ? element("small", {}, unit) : null),
+    const [title, unit] = [element("span"), element("small")];
+    const root = element("div", { class: "scalar-bar", role: "group" }, element("div", { class: "title" }, title, unit),
       element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))));
     this.root.append(root);
-    const shown = { root, ticks, ends, cells, range: bar.range, typed: (_: Range): void => undefined };
+    // What the run says of a field may come later than its values.
+    const name = (text: BarText): void => {
+      root.setAttribute("aria-label", text.title);
+      ["lowest value", "highest value"].forEach((label, i) => ends[i]!.setAttribute("aria-label", `${text.title}: ${label}`));
+      write(title, text.title);
+      write(unit, text.unit ?? "");
+      unit.hidden = !text.unit;
+    };
+    const shown = { root, ticks, ends, cells, range: bar.range, name, typed: (_: Range): void => undefined };
     this.shown.set(bar.key, shown);
     return shown;
   }

@@ -27,4 +27,13 @@ describe("a scalar bar", () => {
     high.dispatchEvent(new Event("change"));
     expect(fixed).toEqual([[["cut"], [1 / 3, 700]]]);
   });
+
+  it("has the title and the unit that the run has told last", () => {
+    const said = (): (string | null)[] => [root().querySelector(".title")!.textContent, root().firstElementChild!.getAttribute("aria-label"), root().querySelector("input")!.getAttribute("aria-label")];
+    show([0, 1]);
+    expect(said()).toEqual(["p", "p", "p: highest value"]);
+    text = { title: "p magnitude", unit: "Pa" };
+    show([0, 1]);
+    expect(said()).toEqual(["p magnitudePa", "p magnitude", "p magnitude: highest value"]);
+  });
 });
