@@ -146,7 +146,8 @@ export class HistoryPlot implements Tab {
       legend: { show: false },
       cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
       scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, { auto: true, range: padded }])) },
-      series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, spanGaps: true, points: { show: false } }))],
+      // A line goes on where only another source has spoken, and breaks where its own has said what is no number.
+      series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, points: { show: false } }))],
       axes: [
         { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
         ...scales.slice(0, AXES).map((scale, i) => ({
