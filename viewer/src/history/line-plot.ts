@@ -13,7 +13,7 @@ import { LINE, lineBetween, lineOf, withLine } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
-import { axesOf, labelled, padded, seriesColour } from "./plotting";
+import { axesOf, labelled, padded, roomy, seriesColour } from "./plotting";
 import { profile, together } from "./profile";
 import type { Profile } from "./profile";
 import { ValuePlot } from "./value-plot";
@@ -143,7 +143,7 @@ export class LinePlot extends ValuePlot {
       ...this.size(), padding: [10, 12, 0, 0], legend: { show: false },
       scales: { x: { time: false }, y: { auto: true, range: padded } },
       series: [{}, { label: title, stroke: seriesColour(this.body, 0), width: 1.8, points: { show: false } }, { label: "before", stroke: seriesColour(this.body, 1), width: 1.4, dash: [6, 4], points: { show: false } }],
-      axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: 62, values: labelled }],
+      axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: roomy(62), values: labelled }],
     }, data, this.canvas);
   }
 

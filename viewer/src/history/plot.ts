@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
-import { SERIES_COLOURS, axesOf, labelled, padded, seriesColour, seriesStyle } from "./plotting";
+import { SERIES_COLOURS, axesOf, labelled, padded, roomy, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
@@ -151,7 +151,7 @@ export class HistoryPlot implements Tab {
       axes: [
         { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
         ...scales.slice(0, AXES).map((scale, i) => ({
-          ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: 58, grid: i === 0 ? grid : { show: false },
+          ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: roomy(58), grid: i === 0 ? grid : { show: false },
           stroke: scales.length === 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
           values: labelled,
         })),

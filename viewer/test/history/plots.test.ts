@@ -3,6 +3,7 @@ import type uPlot from "uplot";
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Dock } from "../../src/history/dock";
 import { HistoryPlot } from "../../src/history/plot";
+import { labelled, padded } from "../../src/history/plotting";
 import { History } from "../../src/history/series";
 
 /** Stands in for a plot, which needs a canvas. */
@@ -43,5 +44,28 @@ describe("the plots below the picture", () => {
     expect(redraw).not.toHaveBeenCalled();
     dock.recolour();
     expect(redraw).toHaveBeenCalledOnce();
+  });
+
+  it("have axes as wide as their labels, which are long where the range is small", () => {
+    const history = new History();
+    for (const cycle of [1, 2]) history.add("health", cycle, cycle, { "quality.min": 0.5 });
+    new HistoryPlot(history, null, () => undefined).show(true);
+    const { size, values } = made[0]!.options.axes![1]! as { size: (...of: unknown[]) => number; values: (plot: null, ticks: number[]) => string[] };
+    const plot = { ctx: { font: "", measureText: (text: string) => ({ width: 6 * text.length }) }, axes: [{}, { font: ["11px sans-serif", 11], ticks: { size: 10 }, gap: 5 }] };
+    expect([size(plot, null, 1, 0), size(plot, values(null, [0, 1, 2]), 1, 1)]).toEqual([58, 58]);
+    expect(plot.ctx.font).toBe("11px sans-serif");
+    const labels = values(null, [101325.0001, 101325.0002, 101325.0003]);
+    expect(labels).toEqual(["101325.0001", "101325.0002", "101325.0003"]);
+    expect(size(plot, labels, 1, 2)).toBe(81);
+  });
+
+  it("show no smaller part of values than their labels can tell apart", () => {
+    const of = (low: number, high: number): number[] => padded(null as never, low, high);
+    const [low, high] = of(101325, 101325 + 1e-10) as [number, number];
+    expect((high - low) / 101325).toBeCloseTo(1e-9, 12);
+    const ticks = [0, 1, 2, 3, 4].map((i) => low + ((high - low) * i) / 4);
+    expect(new Set(labelled(null as never, ticks)).size).toBe(5);
+    expect(of(1, 2)).toEqual([0.94, 2.06]);
+    expect([of(0, 0), of(-4, -4)]).toEqual([[-1, 1], [-4.4, -3.6]]);
   });
 });
