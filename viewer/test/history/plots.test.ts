@@ -4,7 +4,7 @@ import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Dock } from "../../src/history/dock";
 import { HistoryPlot } from "../../src/history/plot";
 import { labelled, padded } from "../../src/history/plotting";
-import { History } from "../../src/history/series";
+import { History, seriesKey } from "../../src/history/series";
 
 /** Stands in for a plot, which needs a canvas. */
 const made = vi.hoisted(() => [] as { options: uPlot.Options; redraw: () => void }[]);
@@ -67,5 +67,29 @@ describe("the plots below the picture", () => {
     expect(new Set(labelled(null as never, ticks)).size).toBe(5);
     expect(of(1, 2)).toEqual([0.94, 2.06]);
     expect([of(0, 0), of(-4, -4)]).toEqual([[-1, 1], [-4.4, -3.6]]);
+  });
+
+  it("show what is seen at first where nothing is there of what was chosen, and nothing where that was wished", () => {
+    const history = new History();
+    for (const cycle of [1, 2]) history.add("flow", cycle, cycle, { drop: 0.5, other: 1 });
+    const drawn = (picked: string[]): (string | undefined)[] => {
+      made.length = 0;
+      new HistoryPlot(history, picked, () => undefined).show(true);
+      return made.flatMap(({ options }) => options.series.slice(1).map(({ label }) => label as string));
+    };
+    expect(drawn([seriesKey("gone", "x")])).toEqual(["drop"]);
+    expect(drawn([seriesKey("gone", "x"), seriesKey("flow", "other")])).toEqual(["other"]);
+    expect(drawn([])).toEqual([]);
+  });
+
+  it("keep no pins, which are gone with the page", () => {
+    const history = new History();
+    const pin = seriesKey("probe 1, pressure", "pressure"), drop = seriesKey("flow", "drop");
+    for (const [source, name] of [["flow", "drop"], ["probe 1, pressure", "pressure"]] as const) history.add(source, 1, 1, { [name]: 1 });
+    const kept: (readonly string[] | null)[] = [];
+    const plot = new HistoryPlot(history, null, (chosen) => { kept.push(chosen); });
+    plot.choose(pin);
+    new HistoryPlot(history, [], (chosen) => { kept.push(chosen); }).choose(pin);
+    expect(kept).toEqual([[drop], null]);
   });
 });
