@@ -79,7 +79,7 @@ import { addresses, kernel, stream } from "./start";
 
 const { connection } = stream;
 
-const kept = new Kept(window.localStorage);
+const kept = new Kept(window.localStorage, location.pathname);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
 const DRAFTS = `tombolo-drafts ${location.pathname}`;
 const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);

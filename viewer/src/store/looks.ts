@@ -51,15 +51,24 @@ function withOpenField(look: Look, fields: readonly FieldInformation[], carried:
   return { ...look, field: field.name, component: -1 };
 }
 
-/** The looks of the views that there are now: those that are new look as they do at first, the others as they did. */
+/** The most looks that are kept of views that are no more. */
+const KEPT = 200;
+
+/**
+ * The looks of the views that there are now: those that are new look as they do at first, the others as they did. Those of views that are
+ * no more are kept before them, for they may come back.
+ */
 export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks, carried: Carried = {}): Looks {
-  return Object.fromEntries(views.map((view) => [view.name, withOpenField(own(before, view.name) ?? firstLook(view, views), fields, own(carried, view.name))]));
+  const names = new Set(views.map(({ name }) => name));
+  const others = Object.entries(before).filter(([name]) => !names.has(name)).slice(-KEPT);
+  return Object.fromEntries([...others,
+    ...views.map((view): [string, Look] => [view.name, withOpenField(own(before, view.name) ?? firstLook(view, views), fields, own(carried, view.name))])]);
 }
 
-/** The looks with some of one view's, or of all, another. */
-export function withLook(looks: Looks, view: string | null, look: Partial<Look>): Looks {
+/** The looks with some of the views another. */
+export function withLook(looks: Looks, views: readonly string[], look: Partial<Look>): Looks {
   const chosen = look.field === undefined ? look : { isFieldOpen: false, ...look };
-  return Object.fromEntries(Object.entries(looks).map(([name, before]) => [name, view === null || name === view ? { ...before, ...chosen } : before]));
+  return Object.fromEntries(Object.entries(looks).map(([name, before]) => [name, views.includes(name) ? { ...before, ...chosen } : before]));
 }
 
 /** The looks with one view seen, and no other. */

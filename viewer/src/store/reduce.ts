@@ -76,7 +76,10 @@ function after(state: State, action: Action): State {
     case "unreadable": return { ...state, errors: [...state.errors, action.text].slice(-LONGEST_ERRORS) };
     case "schema": return withSchema(state, action.form, action.settings);
     case "order sent": return withOrderSent(state, action.id, action.order, action.at);
-    case "look": return { ...state, looks: withLook(state.looks, action.view, action.look) };
+    case "look": {
+      const views = action.view === null ? (state.hello?.views ?? []).map(({ name }) => name) : [action.view];
+      return { ...state, looks: withLook(state.looks, views, action.look) };
+    }
     case "view chosen": return { ...state, chosenView: action.view };
     case "part": {
       const parts = withPart(state.selection.parts, action.feature, action.part);
@@ -159,7 +162,7 @@ function withoutLostEdit(state: State, next: State): State {
 function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
   const looks = looksOf(views, fields, state.looks, state.carried);
   const isColoured = (name: string): boolean => own(looks, name)?.field != null;
-  const known = state.chosenView !== null && Object.hasOwn(looks, state.chosenView);
+  const known = views.some(({ name }) => name === state.chosenView);
   // Before there were fields no view was worth more than another.
   const isFirstChoice = fields.length > 0 && state.hello?.fields.length === 0 && !isColoured(state.chosenView ?? "");
   const coloured = views.find(({ name }) => isColoured(name)) ?? views[0];

@@ -80,7 +80,7 @@ export interface State {
   frames: Frames;
   /** The fields that each view carries, as its frames say. */
   carried: Carried;
-  /** How each view looks, and the one whose look is being changed. */
+  /** How each view looks, also one that is no more and may come back; and the one whose look is being changed. */
   looks: Looks;
   chosenView: string | null;
   /** By view, within how many times the error that was asked for its values are, where the connection does not carry it as it is. */

@@ -4,6 +4,7 @@ import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
 import { looksOf, readLooks } from "../../src/store/looks";
+import type { Looks } from "../../src/store/looks";
 import { appliedOrders } from "../../src/store/orders";
 import { runState, slowLink, whyNotSteering } from "../../src/store/run";
 import { Selection } from "../../src/store/selection";
@@ -227,6 +228,28 @@ describe("how views look", () => {
     store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
     greet({ views: [CUT], fields: [VELOCITY, PRESSURE] });
     expect(store.state.looks.cut!.field).toBe("pressure");
+  });
+
+  it("comes back with a view that was gone", () => {
+    const A = { name: "a", kind: "slice" }, B = { name: "b", kind: "slice" };
+    const { store, greet } = page({ views: [A] });
+    store.dispatch({ type: "look", view: "a", look: { map: "cividis" } });
+    store.dispatch({ type: "view chosen", view: "a" });
+    const before = store.state.looks.a;
+    greet({ views: [] });
+    expect(store.state.chosenView).toBeNull();
+    greet({ views: [B] });
+    expect(store.state.chosenView).toBe("b");
+    // What is done to all views is done to those that are there.
+    store.dispatch({ type: "look", view: null, look: { opacity: 0.5 } });
+    greet({ views: [A, B] });
+    expect([store.state.looks.a, store.state.looks.b!.opacity]).toEqual([before, 0.5]);
+  });
+
+  it("is kept of so many views that are no more, the oldest out", () => {
+    let looks: Looks = {};
+    for (let i = 0; i < 300; i++) looks = looksOf([{ name: `view ${i}`, kind: "slice" }], [], looks);
+    expect(Object.keys(looks)).toEqual(Array.from({ length: 201 }, (_, i) => `view ${i + 99}`));
   });
 
   it("leaves the field open over a reload where only something else was chosen", () => {
