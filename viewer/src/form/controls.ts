@@ -2,7 +2,7 @@
 import type { Json } from "../connection/protocol";
 import { element, identifier, write as writeText } from "../dom";
 import { exactCell } from "../exact";
-import { readNumber, words } from "../number";
+import { readNumber, whyNoNumber, words } from "../number";
 import type { Problem } from "../store/state";
 import { startOf, startOfObject } from "./schema";
 import type { Field, Property } from "./schema";
@@ -90,7 +90,7 @@ function numberInput(label: string): HTMLInputElement {
 /** The number that a text is, within the bounds of its field; or what is wrong with it. */
 export function numberFrom(text: string, field: Field & { kind: "number" }): number | string {
   const value = readNumber(text);
-  if (value === null) return text.trim() === "" ? "is empty" : `“${text}” is not a number`;
+  if (value === null) return whyNoNumber(text);
   if (field.integer && !Number.isInteger(value)) return "must be a whole number";
   if (value < field.minimum || (field.exclusiveMinimum && value === field.minimum)) return `must be ${field.exclusiveMinimum ? "more than" : "at least"} ${field.minimum}`;
   if (value > field.maximum || (field.exclusiveMaximum && value === field.maximum)) return `must be ${field.exclusiveMaximum ? "less than" : "at most"} ${field.maximum}`;

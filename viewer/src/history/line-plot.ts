@@ -2,10 +2,10 @@
 import uPlot from "uplot";
 import type { Pipelines } from "../connection/pipelines";
 import type { DataFrame, Vector } from "../connection/protocol";
-import { download, element, write } from "../dom";
+import { download, element, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
-import { digits, readNumber } from "../number";
+import { digits, readNumber, whyNoNumber } from "../number";
 import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
@@ -103,7 +103,7 @@ export class LinePlot extends ValuePlot {
   private typed(): void {
     const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map(({ input, cell }) => {
       const value = cell.untouched() ?? readNumber(input.value);
-      input.setAttribute("aria-invalid", String(value === null && input.value !== ""));
+      markWrong(input, value === null && input.value !== "" ? whyNoNumber(input.value) : "");
       return value;
     });
     const [from, to] = [read("from"), read("to")];

@@ -1,7 +1,7 @@
 /** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
-import { element, identifier, write } from "../dom";
+import { element, identifier, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
-import { readNumber, within, words } from "../number";
+import { readNumber, whyNoNumber, within, words } from "../number";
 import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
@@ -106,8 +106,8 @@ export class LookPanel {
   /** A number typed at either end fixes the range. */
   private typed(): void {
     const [low, high] = this.ends.map(([input, cell]) => cell.untouched() ?? readNumber(input.value)) as [number | null, number | null];
-    const wrong = { low: low === null, high: high === null || (low !== null && high <= low) };
-    for (const [input, bad] of [[this.low, wrong.low], [this.high, wrong.high]] as const) input.setAttribute("aria-invalid", String(bad));
+    markWrong(this.low, low === null ? whyNoNumber(this.low.value) : "");
+    markWrong(this.high, high === null ? whyNoNumber(this.high.value) : low !== null && high <= low ? "must be more than the lowest value" : "");
     if (low !== null && high !== null && low < high) this.changeRange({ kind: "fixed", low, high });
   }
 
@@ -147,7 +147,7 @@ export class LookPanel {
       if (document.activeElement === input) return;
       if (range) cell.write(range[i]!, within(range[i]!, look?.range.logarithmic ? [0, range[i]!] : range));
       else cell.write(null, "");
-      input.removeAttribute("aria-invalid");
+      markWrong(input, "");
     });
   }
 }

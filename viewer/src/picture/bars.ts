@@ -1,14 +1,15 @@
 /** The scalar bars: what the colours in the picture stand for. A number typed at the end of one fixes its range. */
-import { element, write } from "../dom";
+import { element, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
-import { readNumber, within, words } from "../number";
+import { readNumber, whyNoNumber, within, words } from "../number";
 import { colourMap, componentNames, gradient } from "./colour";
 import { valueAt } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
 
 const TICKS = 6;
+const HINT = "Type a number to fix the range";
 
 /** What a bar is called: its field, and the component of a vector. */
 export interface BarText { title: string; unit: string | null }
@@ -39,15 +40,20 @@ export class ScalarBars {
     const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
     ticks.forEach((tick, i) => write(tick, at(i + 1)));
     ends.forEach((input, i) => {
-      if (document.activeElement !== input) cells[i]!.write(bar.range[i]!, at(i === 0 ? TICKS - 1 : 0));
+      if (document.activeElement === input) return;
+      cells[i]!.write(bar.range[i]!, at(i === 0 ? TICKS - 1 : 0));
+      markWrong(input, "", HINT);
     });
   }
 
   private make(bar: Bar): NonNullable<ReturnType<typeof this.shown.get>> {
     const end = (): HTMLInputElement => element("input", {
-      type: "text", inputmode: "decimal", autocomplete: "off", title: "Type a number to fix the range", onchange: () => {
-        const [low, high] = ends.map((input, i) => cells[i]!.untouched() ?? readNumber(input.value) ?? shown.range[i]!) as Range;
-        if (low < high) shown.typed([low, high]);
+      type: "text", inputmode: "decimal", autocomplete: "off", title: HINT, onchange: () => {
+        // An end that is left empty is as it was.
+        const typed = ends.map((input, i) => cells[i]!.untouched() ?? (input.value.trim() === "" ? shown.range[i]! : readNumber(input.value)));
+        ends.forEach((input, i) => markWrong(input, typed[i] === null ? whyNoNumber(input.value) : "", HINT));
+        const [low, high] = typed as [number | null, number | null];
+        if (low !== null && high !== null && low < high) shown.typed([low, high]);
       },
     });
     const ends: [HTMLInputElement, HTMLInputElement] = [end(), end()];

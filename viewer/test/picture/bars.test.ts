@@ -26,6 +26,11 @@ describe("a scalar bar", () => {
     high.value = "700";
     high.dispatchEvent(new Event("change"));
     expect(fixed).toEqual([[["cut"], [1 / 3, 700]]]);
+    high.value = "1,500";
+    high.dispatchEvent(new Event("change"));
+    expect([fixed.length, high.getAttribute("aria-invalid"), high.title]).toEqual([1, "true", "“1,500” can be read in two ways: write 1500 or 1.5"]);
+    show([0, 1]);
+    expect([high.value, high.getAttribute("aria-invalid")]).toEqual(["1", "false"]);
   });
 
   it("has the title and the unit that the run has told last", () => {
