@@ -3,6 +3,7 @@ import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
 import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
 import { Stack } from "./connection/stack";
+import { watchDefects } from "./defects";
 import { part, write } from "./dom";
 import { EditForm, initialSettings } from "./form/form";
 import { orderForm } from "./form/schema";
@@ -93,6 +94,8 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
 /** The first picture comes before all that can wait. */
 const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
+// One that comes of its own notice is told once.
+watchDefects(window, (text) => { if (text !== store.state.errors.at(-1)) report(text); });
 
 const stack = new Stack(addresses.stack, {
   awaited: () => store.dispatch({ type: "stack awaited", undoable: stack.told.undoable }),
@@ -413,7 +416,7 @@ store.watch((state) => state.errors, (errors) => {
   const newest = errors.at(-1);
   const notice = part("notice");
   if (newest === undefined) return;
-  write(notice, `Something that arrived could not be read: ${newest}.`);
+  write(notice, `Something went wrong: ${newest}.`);
   notice.hidden = false;
   clearTimeout(noticed);
   noticed = window.setTimeout(() => { notice.hidden = true; }, 10000);

@@ -108,7 +108,7 @@ export interface State {
   pipelines: PipelinesState;
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
-  /** What went wrong on the way here: frames or messages that could not be read, newest last. */
+  /** What went wrong: frames or messages that could not be read, and what has failed in the page; newest last. */
   errors: readonly string[];
 }
 
