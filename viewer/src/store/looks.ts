@@ -30,19 +30,19 @@ export type Carried = Readonly<Record<string, readonly FieldInformation[]>>;
 const RANGE: RangeChoice = { kind: "auto", low: 0, high: 1, symmetric: false, logarithmic: false };
 
 /** How a view looks at first. A surface that hides what is inside it is of little use: it is a shell of glass then. */
-function firstLook(view: ViewInformation, views: readonly ViewInformation[]): Look {
+export function firstLook(view: ViewInformation, views: readonly ViewInformation[], fields: readonly FieldInformation[], carried?: readonly FieldInformation[]): Look {
   const isShell = view.kind === "surface" && views.some((other) => other.kind !== "surface");
-  return {
+  return withOpenField({
     visible: true, opacity: isShell ? 0.15 : 1, edges: "features", field: null, isFieldOpen: !isShell, component: -1,
     map: COLOUR_MAPS[0]!.name, range: RANGE,
-  };
+  }, fields, carried);
 }
 
 /**
  * A look whose field nobody has chosen, by the fields that there are: the first vector, else the first of all. Where it is known what the
  * view carries, it is one of those.
  */
-function withOpenField(look: Look, fields: readonly FieldInformation[], carried: readonly FieldInformation[] | undefined): Look {
+function withOpenField(look: Look, fields: readonly FieldInformation[], carried?: readonly FieldInformation[]): Look {
   const has = (list: readonly FieldInformation[], name: string | null): boolean => list.some((field) => field.name === name);
   // Those of the solver come before what is made of them.
   const there = carried ? [...carried.filter(({ name }) => has(fields, name)), ...carried.filter(({ name }) => !has(fields, name))] : fields;
@@ -61,14 +61,18 @@ const KEPT = 200;
 export function looksOf(views: readonly ViewInformation[], fields: readonly FieldInformation[], before: Looks, carried: Carried = {}): Looks {
   const names = new Set(views.map(({ name }) => name));
   const others = Object.entries(before).filter(([name]) => !names.has(name)).slice(-KEPT);
-  return Object.fromEntries([...others,
-    ...views.map((view): [string, Look] => [view.name, withOpenField(own(before, view.name) ?? firstLook(view, views), fields, own(carried, view.name))])]);
+  return Object.fromEntries([...others, ...views.map((view): [string, Look] => {
+    const [known, there] = [own(before, view.name), own(carried, view.name)];
+    return [view.name, known ? withOpenField(known, fields, there) : firstLook(view, views, fields, there)];
+  })]);
 }
 
-/** The looks with some of the views another. */
+/** The looks with some of the views another. Whoever chooses a field, or the component or the range of the one that there is, has chosen it. */
 export function withLook(looks: Looks, views: readonly string[], look: Partial<Look>): Looks {
-  const chosen = look.field === undefined ? look : { isFieldOpen: false, ...look };
-  return Object.fromEntries(Object.entries(looks).map(([name, before]) => [name, views.includes(name) ? { ...before, ...chosen } : before]));
+  const isOpenAfter = ({ field, isFieldOpen }: Look): boolean =>
+    isFieldOpen && look.field === undefined && (field === null || (look.component === undefined && look.range === undefined));
+  return Object.fromEntries(Object.entries(looks).map(([name, before]) =>
+    [name, views.includes(name) ? { ...before, ...look, isFieldOpen: isOpenAfter(before) } : before]));
 }
 
 /** The looks with one view seen, and no other. */

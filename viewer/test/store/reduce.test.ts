@@ -223,6 +223,13 @@ describe("how views look", () => {
     expect(carries(VELOCITY)).toBe("vorticity");
   });
 
+  it("is by the field whose range was chosen, whatever the view carries later", () => {
+    const { store } = page({ views: [CUT], fields: [VELOCITY] });
+    store.dispatch({ type: "look", view: "cut", look: { range: { ...store.state.looks.cut!.range, kind: "fixed" } } });
+    store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("velocity");
+  });
+
   it("may be told by a frame before the run has said which views there are", () => {
     const { store, greet } = page();
     store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
