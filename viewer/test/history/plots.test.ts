@@ -7,13 +7,13 @@ import { labelled, padded } from "../../src/history/plotting";
 import { History, seriesKey } from "../../src/history/series";
 
 /** Stands in for a plot, which needs a canvas. */
-const made = vi.hoisted(() => [] as { options: uPlot.Options; redraw: () => void }[]);
+const made = vi.hoisted(() => [] as { options: uPlot.Options; data: uPlot.AlignedData; redraw: () => void }[]);
 vi.mock("uplot", () => ({
   default: class {
     redraw = vi.fn();
     setData = vi.fn();
     setScale = vi.fn();
-    constructor(readonly options: uPlot.Options) { made.push(this); }
+    constructor(readonly options: uPlot.Options, readonly data: uPlot.AlignedData) { made.push(this); }
   },
 }));
 
@@ -67,6 +67,18 @@ describe("the plots below the picture", () => {
     expect(new Set(labelled(null as never, ticks)).size).toBe(5);
     expect(of(1, 2)).toEqual([0.94, 2.06]);
     expect([of(0, 0), of(-4, -4)]).toEqual([[-1, 1], [-4.4, -3.6]]);
+  });
+
+  it("break where a monitor has said what is no number, and go on where only another has spoken", () => {
+    const history = new History();
+    for (const [cycle, p] of [[1, 2], [2, NaN], [4, 3]] as const) history.add("a", cycle, cycle, { p });
+    history.add("b", 3, 3, { q: 1 });
+    const plot = new HistoryPlot(history, [seriesKey("a", "p"), seriesKey("b", "q")], () => undefined);
+    document.body.append(plot.body);
+    plot.show(true);
+    const [{ options, data }] = made as [typeof made[0]];
+    expect(options.series.map(({ spanGaps }) => spanGaps ?? false)).toEqual([false, false, false]);
+    expect(data).toEqual([[1, 2, 3, 4], [2, null, undefined, 3], [undefined, undefined, 1, undefined]]);
   });
 
   it("show what is seen at first where nothing is there of what was chosen, and nothing where that was wished", () => {
