@@ -50,7 +50,7 @@ describe("the plots below the picture", () => {
     const history = new History();
     for (const cycle of [1, 2]) history.add("health", cycle, cycle, { "quality.min": 0.5 });
     new HistoryPlot(history, null, () => undefined).show(true);
-    const { size, values } = made[0]!.options.axes![1]! as { size: (...of: unknown[]) => number; values: (plot: null, ticks: number[]) => string[] };
+    const { size, values } = made[0]!.options.axes![1]! as unknown as { size: (...of: unknown[]) => number; values: (plot: null, ticks: number[]) => string[] };
     const plot = { ctx: { font: "", measureText: (text: string) => ({ width: 6 * text.length }) }, axes: [{}, { font: ["11px sans-serif", 11], ticks: { size: 10 }, gap: 5 }] };
     expect([size(plot, null, 1, 0), size(plot, values(null, [0, 1, 2]), 1, 1)]).toEqual([58, 58]);
     expect(plot.ctx.font).toBe("11px sans-serif");
