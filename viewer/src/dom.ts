@@ -30,6 +30,12 @@ export function write(target: Element, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }
 
+/** Marks an input as wrong, and says why under the pointer; empty where nothing is wrong with it, and it has its hint. */
+export function markWrong(input: HTMLElement, why: string, hint = ""): void {
+  input.setAttribute("aria-invalid", String(why !== ""));
+  input.title = why || hint;
+}
+
 /** The kinds of input that take no text. */
 const NO_TEXT = ["button", "checkbox", "color", "file", "radio", "range", "reset", "submit"].map((type) => `:not([type=${type}])`).join("");
 const TEXT = `textarea, input${NO_TEXT}, [contenteditable]:not([contenteditable=false]), .cm-editor`;

@@ -60,7 +60,7 @@ export interface Inspection {
   readonly gizmo: Readonly<Record<string, [number, number]>>;
   /** A place of the page at which the slice of the chosen view can be gripped; null where it cannot. */
   readonly sliceHandle: [number, number] | null;
-  /** What went wrong, newest last: frames or messages that could not be read. */
+  /** What went wrong, newest last: frames or messages that could not be read, and what has failed in the page. */
   readonly errors: readonly string[];
   /** The box around a feature as it is now; null when no view shows it. */
   featureBounds(name: string): [Vector, Vector] | null;

@@ -3,6 +3,7 @@ import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
 import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
 import { Stack } from "./connection/stack";
+import { watchDefects } from "./defects";
 import { part, write } from "./dom";
 import { EditForm, initialSettings } from "./form/form";
 import { orderForm } from "./form/schema";
@@ -64,6 +65,7 @@ import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
 import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
+import { fieldNamed, fieldsOf, sameFields } from "./store/fields";
 import { Kept } from "./store/kept";
 import { onlyLook } from "./store/looks";
 import type { Look } from "./store/looks";
@@ -78,7 +80,7 @@ import { addresses, kernel, stream } from "./start";
 
 const { connection } = stream;
 
-const kept = new Kept(window.localStorage);
+const kept = new Kept(window.localStorage, location.pathname);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
 const DRAFTS = `tombolo-drafts ${location.pathname}`;
 const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);
@@ -92,6 +94,8 @@ store.watch((state) => state.pipelines.drafts, (drafts) => {
 /** The first picture comes before all that can wait. */
 const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });
+// One that comes of its own notice is told once.
+watchDefects(window, (text) => { if (text !== store.state.errors.at(-1)) report(text); });
 
 const stack = new Stack(addresses.stack, {
   awaited: () => store.dispatch({ type: "stack awaited", undoable: stack.told.undoable }),
@@ -123,15 +127,15 @@ function canvasOfPage(): Canvas {
 }
 const selection = new Selection(store);
 const triad = new Triad();
-/** A field and its component in words. */
-const fieldTitle = (field: string | null, component: number): string =>
-  fieldText(field ?? "", store.state.hello?.fields.find((candidate) => candidate.name === field)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
+/** A field and its component in words, as a view carries it. */
+const fieldTitle = (field: string | null, component: number, view: string | null = null): string =>
+  fieldText(field ?? "", fieldNamed(store.state, field, view)?.components ?? 1, component, own(FIELD_TITLES, field ?? ""));
 /** The unit of a field; null where none is given. */
-const unitOf = (field: string | null): string | null => store.state.hello?.fields.find((candidate) => candidate.name === field)?.unit ?? null;
+const unitOf = (field: string | null): string | null => fieldNamed(store.state, field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
 const titleWithUnit = (field: string | null, component: number): string => withUnit(fieldTitle(field, component), unitOf(field));
 let shownBars: Bar[] = [];
-const bars = new ScalarBars(part("bars"), ({ look: { field, component } }) => ({ title: fieldTitle(field, component), unit: unitOf(field) }), (names, [low, high]) => {
+const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }) => ({ title: fieldTitle(field, component, views[0]), unit: unitOf(field) }), (names, [low, high]) => {
   for (const view of names) {
     const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
@@ -369,8 +373,10 @@ function takeHello({ stack: told, ...hello }: ToldHello): void {
 }
 
 function takeFrame(frame: Frame): void {
-  if (frame.kind === "topology") scene.setTopology(frame);
-  else if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
+  if (frame.kind === "topology") return scene.setTopology(frame);
+  const fields = fieldsOf(frame);
+  if (!sameFields(own(store.state.carried, frame.view), fields)) store.dispatch({ type: "carries", view: frame.view, fields });
+  if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
 store.watch((state) => state.hello, (hello) => {
@@ -410,7 +416,7 @@ store.watch((state) => state.errors, (errors) => {
   const newest = errors.at(-1);
   const notice = part("notice");
   if (newest === undefined) return;
-  write(notice, `Something that arrived could not be read: ${newest}.`);
+  write(notice, `Something went wrong: ${newest}.`);
   notice.hidden = false;
   clearTimeout(noticed);
   noticed = window.setTimeout(() => { notice.hidden = true; }, 10000);

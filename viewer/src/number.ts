@@ -30,12 +30,28 @@ export function seconds(value: number | null | undefined): string {
   return `${digits(value / 60, 3)}\u00a0min`;
 }
 
-/** Reads a number as a person writes one; null when it is none. */
+/** Digits in threes: with a comma for the decimal point by some, for the thousands by others. A number of thousands does not begin with a zero. */
+const THREES = /^[+-]?[1-9]\d{0,2}(,\d{3})+$/;
+
+const plain = (text: string): string => text.trim().replaceAll("−", "-");
+
+/** Reads a number as a person writes one, with a point or a comma; null when it is none, or could be two. */
 export function readNumber(text: string): number | null {
-  const plain = text.trim().replaceAll("−", "-").replace(",", ".");
-  if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain)) return null;
-  const value = Number(plain);
+  const typed = plain(text);
+  const pointed = typed.replace(",", ".");
+  if (THREES.test(typed) || !/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(pointed)) return null;
+  const value = Number(pointed);
   return Number.isFinite(value) ? value : null;
+}
+
+/** Why a text is no number, in words that follow its name; empty where it is one. */
+export function whyNoNumber(text: string): string {
+  if (readNumber(text) !== null) return "";
+  if (text.trim() === "") return "is empty";
+  const typed = plain(text);
+  if (!THREES.test(typed)) return `“${text}” is not a number`;
+  const [whole, parts] = [typed.replaceAll(",", ""), typed.split(",").length];
+  return parts > 2 ? `“${text}” has commas: write ${whole}` : `“${text}” can be read in two ways: write ${whole} or ${Number(typed.replace(",", "."))}`;
 }
 
 /** A name from the JSON as words: `harmonic_order` is "harmonic order". */

@@ -1,7 +1,8 @@
 /** One control for each kind of field: it shows a value, reads it back, and says beside it what is wrong. */
 import type { Json } from "../connection/protocol";
 import { element, identifier, write as writeText } from "../dom";
-import { readNumber, words } from "../number";
+import { exactCell } from "../exact";
+import { readNumber, whyNoNumber, words } from "../number";
 import type { Problem } from "../store/state";
 import { startOf, startOfObject } from "./schema";
 import type { Field, Property } from "./schema";
@@ -89,7 +90,7 @@ function numberInput(label: string): HTMLInputElement {
 /** The number that a text is, within the bounds of its field; or what is wrong with it. */
 export function numberFrom(text: string, field: Field & { kind: "number" }): number | string {
   const value = readNumber(text);
-  if (value === null) return text.trim() === "" ? "is empty" : `“${text}” is not a number`;
+  if (value === null) return whyNoNumber(text);
   if (field.integer && !Number.isInteger(value)) return "must be a whole number";
   if (value < field.minimum || (field.exclusiveMinimum && value === field.minimum)) return `must be ${field.exclusiveMinimum ? "more than" : "at least"} ${field.minimum}`;
   if (value > field.maximum || (field.exclusiveMaximum && value === field.maximum)) return `must be ${field.exclusiveMaximum ? "less than" : "at most"} ${field.maximum}`;
@@ -106,11 +107,11 @@ export function numberText(value: Json | undefined): string {
 /** An input for a number. A value that was written into it and not touched since is read as it was, to the last bit. */
 function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTMLElement): { input: HTMLInputElement; read(problems: Problem[]): number | undefined; write(value: Json | undefined): void } {
   const input = numberInput(label);
-  let written: { text: string; value: number } | null = null;
+  const cell = exactCell(input);
   return {
     input,
     read: (problems) => {
-      const value = written !== null && input.value === written.text ? written.value : numberFrom(input.value, field);
+      const value = cell.untouched() ?? numberFrom(input.value, field);
       if (typeof value === "number") {
         mark(input, wrong, "");
         return value;
@@ -120,8 +121,7 @@ function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTM
       return undefined;
     },
     write: (value) => {
-      input.value = numberText(value);
-      written = typeof value === "number" ? { text: input.value, value } : null;
+      cell.write(typeof value === "number" ? value : null, numberText(value));
       mark(input, wrong, "");
     },
   };

@@ -2,8 +2,10 @@
 import uPlot from "uplot";
 import type { Pipelines } from "../connection/pipelines";
 import type { DataFrame, Vector } from "../connection/protocol";
-import { download, element, write } from "../dom";
-import { digits, readNumber } from "../number";
+import { download, element, markWrong, write } from "../dom";
+import { exactCell } from "../exact";
+import type { ExactCell } from "../exact";
+import { digits, readNumber, whyNoNumber } from "../number";
 import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
@@ -11,7 +13,7 @@ import { LINE, lineBetween, lineOf, withLine } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
-import { axesOf, labelled, padded, seriesColour } from "./plotting";
+import { axesOf, labelled, padded, roomy, seriesColour } from "./plotting";
 import { profile, together } from "./profile";
 import type { Profile } from "./profile";
 import { ValuePlot } from "./value-plot";
@@ -31,7 +33,7 @@ export class LinePlot extends ValuePlot {
   readonly title = "Line";
   readonly tools: readonly HTMLElement[];
   private readonly note = element("p", { class: "hint" });
-  private readonly ends: Record<"from" | "to", HTMLInputElement[]>;
+  private readonly ends: Record<"from" | "to", { input: HTMLInputElement; cell: ExactCell }[]>;
   private readonly remove: HTMLButtonElement;
   private readonly csv: HTMLButtonElement;
   private shape = "";
@@ -44,10 +46,12 @@ export class LinePlot extends ValuePlot {
     private readonly earlier: Earlier, private readonly changed: () => void,
   ) {
     super(store, REST);
-    const inputs = (label: string): HTMLInputElement[] => ["x", "y", "z"].map((axis) =>
-      element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, placeholder: axis, onchange: () => this.typed() }));
+    const inputs = (label: string): { input: HTMLInputElement; cell: ExactCell }[] => ["x", "y", "z"].map((axis) => {
+      const input = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${label} ${axis}`, placeholder: axis, onchange: () => this.typed() });
+      return { input, cell: exactCell(input) };
+    });
     this.ends = { from: inputs("from"), to: inputs("to") };
-    const row = (label: "from" | "to"): HTMLElement => element("div", { class: "ends" }, element("span", {}, label), ...this.ends[label]);
+    const row = (label: "from" | "to"): HTMLElement => element("div", { class: "ends" }, element("span", {}, label), ...this.ends[label].map(({ input }) => input));
     this.csv = element("button", { type: "button", class: "small", title: "What is plotted, as comma-separated values", onclick: () => this.download() }, "CSV");
     this.remove = element("button", { type: "button", class: "small", title: "Takes the line away", onclick: () => pipelines.remove(LINE) }, "Remove");
     this.tools = [this.heading, this.csv, this.remove];
@@ -80,7 +84,7 @@ export class LinePlot extends ValuePlot {
     const line = lineOf(this.pipelines.get(LINE));
     this.line = line;
     for (const end of ["from", "to"] as const) {
-      this.ends[end].forEach((input, k) => { if (line && document.activeElement !== input) input.value = digits(line[end][k], 5); });
+      this.ends[end].forEach(({ input, cell }, k) => { if (line && document.activeElement !== input) cell.write(line[end][k]!, digits(line[end][k], 6)); });
     }
     this.say();
     this.changed();
@@ -89,7 +93,7 @@ export class LinePlot extends ValuePlot {
 
   private say(): void {
     const why = whyNotSteering(this.store.state);
-    for (const control of [...this.ends.from, ...this.ends.to]) control.disabled = why !== "";
+    for (const { input } of [...this.ends.from, ...this.ends.to]) input.disabled = why !== "";
     this.remove.disabled = why !== "" || this.line === null;
     this.csv.disabled = this.line === null;
     write(this.note, this.line === null ? "Choose Line in the toolbar and click two places of the picture; or type two points." : why === "" ? "" : `The line is where the run takes it. ${why}`);
@@ -97,9 +101,9 @@ export class LinePlot extends ValuePlot {
   }
 
   private typed(): void {
-    const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map((input) => {
-      const value = readNumber(input.value);
-      input.setAttribute("aria-invalid", String(value === null && input.value !== ""));
+    const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map(({ input, cell }) => {
+      const value = cell.untouched() ?? readNumber(input.value);
+      markWrong(input, value === null && input.value !== "" ? whyNoNumber(input.value) : "");
       return value;
     });
     const [from, to] = [read("from"), read("to")];
@@ -139,7 +143,7 @@ export class LinePlot extends ValuePlot {
       ...this.size(), padding: [10, 12, 0, 0], legend: { show: false },
       scales: { x: { time: false }, y: { auto: true, range: padded } },
       series: [{}, { label: title, stroke: seriesColour(this.body, 0), width: 1.8, points: { show: false } }, { label: "before", stroke: seriesColour(this.body, 1), width: 1.4, dash: [6, 4], points: { show: false } }],
-      axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: 62, values: labelled }],
+      axes: [{ ...axis, size: 30, values: labelled }, { ...axis, size: roomy(62), values: labelled }],
     }, data, this.canvas);
   }
 

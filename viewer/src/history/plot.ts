@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
-import { SERIES_COLOURS, axesOf, labelled, padded, seriesColour, seriesStyle } from "./plotting";
+import { SERIES_COLOURS, axesOf, labelled, padded, roomy, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
 import type { History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
@@ -17,6 +17,8 @@ const AXES = 4;
 const MARK_LINES = 3;
 /** The shortest time between two drawings of new values, in milliseconds. */
 const REST = 250;
+/** The series of pins (`picture/pins.ts`), which are gone with the page. */
+const PIN = /^probe \d+, /;
 
 export class HistoryPlot implements Tab {
   readonly title = "History";
@@ -38,8 +40,11 @@ export class HistoryPlot implements Tab {
   private readonly table = new ValueTable(["value", "before", "difference"], this.heading);
   private readonly whole: HTMLButtonElement;
 
-  /** `picked` are the series that were chosen before; null for those that a person who asks for nothing wants to see. */
-  constructor(private readonly history: History, private picked: readonly string[] | null, private readonly changed: (picked: readonly string[]) => void) {
+  /**
+   * `picked` are the series that were chosen before; null for those that a person who asks for nothing wants to see. `changed` is told what
+   * to keep of another choice.
+   */
+  constructor(private readonly history: History, private picked: readonly string[] | null, private readonly changed: (picked: readonly string[] | null) => void) {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     const csv = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
     this.body = element("div", { class: "dock-body" }, this.canvas,
@@ -86,12 +91,16 @@ export class HistoryPlot implements Tab {
 
   private change(picked: readonly string[]): void {
     this.picked = picked;
-    this.changed(picked);
+    const kept = picked.filter((key) => !PIN.test(key));
+    // Pins alone say nothing of the monitors: those of the beginning are shown where the pins are no more.
+    this.changed(kept.length === 0 && picked.length > 0 ? null : kept);
   }
 
+  /** What is drawn. Where nothing is there of what was chosen, in another run, it is what one sees at first. */
   private chosen(): string[] {
-    const known = new Set(this.history.series.map(({ key }) => key));
-    return (this.picked ?? firstChoice(this.history.series)).filter((key) => known.has(key)).slice(0, DRAWN);
+    const { series } = this.history;
+    const known = this.picked?.filter((key) => series.some((one) => one.key === key));
+    return (known && (known.length > 0 || this.picked?.length === 0) ? known : firstChoice(series)).slice(0, DRAWN);
   }
 
   private draw(): void {
@@ -146,11 +155,12 @@ export class HistoryPlot implements Tab {
       legend: { show: false },
       cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
       scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, { auto: true, range: padded }])) },
-      series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, spanGaps: true, points: { show: false } }))],
+      // A line goes on where only another source has spoken, and breaks where its own has said what is no number.
+      series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, points: { show: false } }))],
       axes: [
         { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
         ...scales.slice(0, AXES).map((scale, i) => ({
-          ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: 58, grid: i === 0 ? grid : { show: false },
+          ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: roomy(58), grid: i === 0 ? grid : { show: false },
           stroke: scales.length === 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
           values: labelled,
         })),

@@ -22,10 +22,14 @@ export function axesOf(root: HTMLElement): { grid: Grid; axis: { stroke: Colour;
   return { grid, axis: { stroke: lookedUp(root, "--soft"), grid, ticks: grid, font: "11px sans-serif" } };
 }
 
+/** A plot shows no smaller part of its values than this: the labels of an axis have twelve digits. */
+const FINEST = 1e-9;
+
 /** A little room above and below; a line that is level lies in the middle. */
 export function padded(_: uPlot, low: number | null, high: number | null): [number, number] {
   if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
-  const room = high > low ? 0.06 * (high - low) : Math.abs(low) * 0.1 || 1;
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  const room = high > low ? Math.max(0.06 * (high - low), (FINEST * size - (high - low)) / 2) : size * 0.1 || 1;
   return [low - room, high + room];
 }
 
@@ -33,3 +37,12 @@ export function padded(_: uPlot, low: number | null, high: number | null): [numb
 export function labelled(_: uPlot, ticks: number[]): string[] {
   return ticks.map((tick) => within(tick, [ticks[0] ?? 0, ticks.at(-1) ?? 1]));
 }
+
+/** The width of an axis in which its longest label has room, and no less than `least`. In a small range labels are long. */
+export const roomy = (least: number) => (plot: uPlot, labels: string[] | null, axis: number): number => {
+  const { font, ticks, gap } = plot.axes[axis] as { font?: string | [string]; ticks?: { size?: number }; gap?: number };
+  // uPlot keeps the font with its size in pixels of the screen.
+  plot.ctx.font = (typeof font === "string" ? font : font?.[0]) ?? "";
+  const longest = Math.max(0, ...(labels ?? []).map((label) => plot.ctx.measureText(label).width / devicePixelRatio));
+  return Math.max(least, Math.ceil(longest + (ticks?.size ?? 0) + (gap ?? 0)));
+};

@@ -5,8 +5,11 @@ export const TIMES = 2000;
 /** The most values that are kept side by side; later ones are not, unless one of a monitor that is no more makes room. */
 export const SERIES = 200;
 
+/** A value at a cycle: null where what was said is no number, undefined where nothing was said. */
+export type Said = number | null | undefined;
+
 /** Values that come together, such as those of one pipeline. */
-interface Source { cycles: number[]; times: number[]; columns: Map<string, (number | null)[]> }
+interface Source { cycles: number[]; times: number[]; columns: Map<string, Said[]> }
 
 /** One value over time: its name in the list, and whence it comes. */
 export interface Series { key: string; source: string; name: string; unit: string | null }
@@ -34,7 +37,7 @@ export class History {
     }
     for (const name of Object.keys(values)) {
       if (kept.columns.has(name) || (this.list.size >= SERIES && !this.makeRoom(kept))) continue;
-      kept.columns.set(name, new Array<null>(kept.cycles.length).fill(null));
+      kept.columns.set(name, new Array<undefined>(kept.cycles.length).fill(undefined));
       const key = seriesKey(source, name);
       this.list.set(key, { key, source, name, unit: this.list.get(key)?.unit ?? null });
     }
@@ -42,7 +45,7 @@ export class History {
     kept.times.push(time);
     for (const [name, column] of kept.columns) {
       const value = values[name];
-      column.push(typeof value === "number" && Number.isFinite(value) ? value : null);
+      column.push(value === undefined || Number.isFinite(value) ? value : null);
     }
     if (kept.cycles.length > TIMES) thin(kept);
   }
@@ -80,8 +83,8 @@ export class History {
     for (const [key, series] of this.list) if (series.source === source) this.list.delete(key);
   }
 
-  /** The cycles of several series together, and the values of each at them; null where it has none. */
-  table(keys: readonly string[]): { cycles: number[]; times: number[]; columns: (number | null)[][] } {
+  /** The cycles of several series together, and what each has said at them. */
+  table(keys: readonly string[]): { cycles: number[]; times: number[]; columns: Said[][] } {
     const chosen = keys.flatMap((key) => this.list.get(key) ?? []);
     const used = new Set(chosen.map((series) => series.source));
     const at = new Map<number, number>();
@@ -92,22 +95,22 @@ export class History {
     const cycles = [...at.keys()].sort((a, b) => a - b);
     const rows = new Map(cycles.map((cycle, row) => [cycle, row]));
     const columns = chosen.map((series) => {
-      const result = new Array<number | null>(cycles.length).fill(null);
+      const result = new Array<Said>(cycles.length).fill(undefined);
       const source = this.sources.get(series.source);
       const column = source?.columns.get(series.name);
-      source?.cycles.forEach((cycle, i) => { result[rows.get(cycle)!] = column?.[i] ?? null; });
+      source?.cycles.forEach((cycle, i) => { result[rows.get(cycle)!] = column?.[i]; });
       return result;
     });
     return { cycles, times: cycles.map((cycle) => at.get(cycle)!), columns };
   }
 
-  /** The newest value of a series at a cycle or before it; null when there is none. */
+  /** What a series has said last at a cycle or before it; null where that was no number, or nothing was said. */
   at(key: string, cycle: number): number | null {
     const series = this.list.get(key);
     const source = series && this.sources.get(series.source);
     const column = series && source?.columns.get(series.name);
     if (!source || !column) return null;
-    for (let i = lastAt(source.cycles, cycle); i >= 0; i--) if (column[i] !== null) return column[i]!;
+    for (let i = lastAt(source.cycles, cycle); i >= 0; i--) if (column[i] !== undefined) return column[i]!;
     return null;
   }
 

@@ -61,7 +61,13 @@ export class FilesPanel {
   }
 
   private async saveSurface(made: (surface: ShownPoints) => [Blob, string]): Promise<void> {
-    const [content, kind] = made(await this.source.surface());
+    let shown: ShownPoints;
+    try {
+      shown = await this.source.surface();
+    } catch (error) {
+      return this.refuse(`The surface cannot be saved: ${error instanceof Error ? error.message : String(error)}.`);
+    }
+    const [content, kind] = made(shown);
     download(content, `${this.name(kind === "stl" ? "surface" : "displacement")}.${kind}`);
   }
 

@@ -1,18 +1,19 @@
 /** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
-import type { FieldInformation } from "../connection/protocol";
-import { element, identifier, write } from "../dom";
-import { digits, readNumber, words } from "../number";
+import { element, identifier, markWrong, write } from "../dom";
+import { exactCell } from "../exact";
+import { readNumber, whyNoNumber, within, words } from "../number";
 import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
 import type { Bar } from "../picture/scene";
 import type { Action } from "../store/actions";
+import { choicesOf, fieldNamed } from "../store/fields";
 import { EDGES } from "../store/looks";
 import type { Look } from "../store/looks";
 import { QUALITY } from "../store/pipelines";
 import { whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
-import { sameJson } from "../store/store";
+import { sameParts } from "../store/store";
 import type { Store } from "../store/store";
 
 const RANGES: readonly [RangeKind, string][] = [["auto", "of each frame"], ["over time", "of all frames so far"], ["fixed", "fixed"]];
@@ -28,6 +29,7 @@ export class LookPanel {
   private readonly kind = element("select", { onchange: () => this.changeKind(this.kind.value as RangeKind) }, ...RANGES.map(([kind, text]) => option(kind, text)));
   private readonly low = this.end("lowest value");
   private readonly high = this.end("highest value");
+  private readonly ends = [this.low, this.high].map((input) => [input, exactCell(input)] as const);
   private readonly unit = element("span", { class: "unit" });
   private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.changeRange({ symmetric: this.symmetric.checked, logarithmic: false }) });
   private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
@@ -55,7 +57,7 @@ export class LookPanel {
       this.quality.disabled = why !== "";
       this.quality.title = why === "" ? "Has the quality of the cells streamed with this view" : why;
     });
-    store.watch((state) => [state.looks, state.chosenView, state.hello?.fields], () => this.show(), sameJson);
+    store.watch((state) => [state.looks, state.chosenView, state.hello?.fields, state.carried], () => this.show(), sameParts);
   }
 
   /** What the colours of the picture stand for now. */
@@ -103,26 +105,29 @@ export class LookPanel {
 
   /** A number typed at either end fixes the range. */
   private typed(): void {
-    const [low, high] = [readNumber(this.low.value), readNumber(this.high.value)];
-    const wrong = { low: low === null, high: high === null || (low !== null && high <= low) };
-    for (const [input, bad] of [[this.low, wrong.low], [this.high, wrong.high]] as const) input.setAttribute("aria-invalid", String(bad));
+    const [low, high] = this.ends.map(([input, cell]) => cell.untouched() ?? readNumber(input.value)) as [number | null, number | null];
+    markWrong(this.low, low === null ? whyNoNumber(this.low.value) : "");
+    markWrong(this.high, high === null ? whyNoNumber(this.high.value) : low !== null && high <= low ? "must be more than the lowest value" : "");
     if (low !== null && high !== null && low < high) this.changeRange({ kind: "fixed", low, high });
   }
 
   private show(): void {
     const { look } = this;
-    const { chosenView, hello } = this.store.state;
+    const { state } = this.store;
+    const { chosenView } = state;
     this.rows.hidden = look === null;
     write(this.heading, chosenView === null ? "Look" : `Look of ${chosenView}`);
-    if (!look) return;
-    const fields: readonly FieldInformation[] = hello?.fields ?? [];
-    // One that the library adds to a view is not among those of the solver.
-    const names = [...new Set([...fields.map(({ name }) => name), ...(look.field === null ? [] : [look.field])])];
-    fill(this.field, [...names.map((name): [string, string] => [name, own(FIELD_TITLES, name) ?? words(name)]), ["", "none"]]);
-    write(this.unit, fields.find(({ name }) => name === look.field)?.unit ?? "");
+    if (!look || chosenView === null) return;
+    const choices = choicesOf(state, chosenView);
+    // One that was asked for has not come yet.
+    if (look.field !== null && !choices.some(({ name }) => name === look.field)) choices.push({ name: look.field, isCarried: false });
+    const title = (name: string): string => own(FIELD_TITLES, name) ?? words(name);
+    fill(this.field, [...choices.map(({ name, isCarried }): Choice => (isCarried ? [name, title(name)] : [name, `${title(name)} (not in this view)`, true])), ["", "none"]]);
+    const field = fieldNamed(state, look.field, chosenView);
+    write(this.unit, field?.unit ?? "");
     this.field.value = look.field ?? "";
-    const count = fields.find((field) => field.name === look.field)?.components ?? 1;
-    fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): [string, string] => [String(i), name])] : []);
+    const count = field?.components ?? 1;
+    fill(this.component, count > 1 ? [["-1", "magnitude"], ...componentNames(count).map((name, i): Choice => [String(i), name])] : []);
     this.component.value = String(look.component);
     this.component.hidden = count <= 1;
     this.map.value = look.map;
@@ -138,20 +143,24 @@ export class LookPanel {
   private showEnds(): void {
     const { look } = this;
     const range: Range | null = look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
-    for (const [input, value] of [[this.low, range?.[0]], [this.high, range?.[1]]] as const) {
-      if (document.activeElement === input) continue;
-      input.value = value === undefined ? "" : digits(value, 5);
-      input.removeAttribute("aria-invalid");
-    }
+    this.ends.forEach(([input, cell], i) => {
+      if (document.activeElement === input) return;
+      if (range) cell.write(range[i]!, within(range[i]!, look?.range.logarithmic ? [0, range[i]!] : range));
+      else cell.write(null, "");
+      markWrong(input, "");
+    });
   }
 }
 
 /** What a field that has a name of the library's own is called on the page. */
 export const FIELD_TITLES: Readonly<Record<string, string>> = { [QUALITY]: "mesh quality" };
 
-function fill(select: HTMLSelectElement, options: readonly [string, string][]): void {
-  const key = JSON.stringify(options);
+/** A choice of a list: its value, its text, and whether it cannot be taken. */
+type Choice = readonly [value: string, text: string, disabled?: boolean];
+
+function fill(select: HTMLSelectElement, choices: readonly Choice[]): void {
+  const key = JSON.stringify(choices);
   if (select.dataset.options === key) return;
   select.dataset.options = key;
-  select.replaceChildren(...options.map(([value, text]) => option(value, text)));
+  select.replaceChildren(...choices.map(([value, text, disabled = false]) => element("option", { value, disabled }, text)));
 }

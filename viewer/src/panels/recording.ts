@@ -16,6 +16,8 @@ export class RecordingPanel {
   private sentAt = -Infinity;
   /** The slider is in somebody's hand: what is told of the moment does not move it. */
   private held = false;
+  /** The slider stands where the recording was not asked to go yet. */
+  private unsent = false;
 
   constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
     store.watch((state) => state.hello?.recording ?? null, (recording) => {
@@ -27,13 +29,12 @@ export class RecordingPanel {
     });
     store.watch((state) => state.played, () => this.show());
     this.slider.addEventListener("input", () => {
-      this.held = true;
+      this.held = this.unsent = true;
       if (performance.now() - this.sentAt >= DRAG_PERIOD) this.seek();
     });
-    this.slider.addEventListener("change", () => {
-      this.held = false;
-      this.seek();
-    });
+    // A drag that ends where it began tells no change, and may end beside the slider.
+    for (const end of ["change", "blur"]) this.slider.addEventListener(end, () => this.letGo());
+    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => this.letGo());
     this.button.addEventListener("click", () => {
       const { played, hello } = this.store.state;
       // From its end a recording begins again.
@@ -43,7 +44,13 @@ export class RecordingPanel {
     this.speed.addEventListener("change", () => this.commands.ask({ play: { speed: Number(this.speed.value) } }));
   }
 
+  private letGo(): void {
+    this.held = false;
+    if (this.unsent) this.seek();
+  }
+
   private seek(): void {
+    this.unsent = false;
     this.sentAt = performance.now();
     this.commands.ask({ play: { seek: { seconds: Number(this.slider.value) } } });
   }

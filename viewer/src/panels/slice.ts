@@ -1,8 +1,8 @@
 /** Where the slice of the chosen view lies: along which axis, and how far. The run is asked to cut elsewhere. */
 import type { Pipelines } from "../connection/pipelines";
 import type { Vector } from "../connection/protocol";
-import { element, identifier, write } from "../dom";
-import { digits, readNumber } from "../number";
+import { element, identifier, markWrong, write } from "../dom";
+import { digits, readNumber, whyNoNumber } from "../number";
 import { own } from "../own";
 import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
 import type { Plane } from "../store/pipelines";
@@ -84,7 +84,7 @@ export class SlicePanel implements Sliced {
 
   private typed(): void {
     const offset = readNumber(this.offset.value);
-    this.offset.setAttribute("aria-invalid", String(offset === null));
+    markWrong(this.offset, offset === null ? whyNoNumber(this.offset.value) : "");
     if (this.plane && offset !== null) this.move(atOffset(this.plane, offset));
   }
 

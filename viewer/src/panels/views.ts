@@ -4,13 +4,13 @@ import { element, identifier, write } from "../dom";
 import { own } from "../own";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
-import { sameJson } from "../store/store";
+import { sameJson, sameParts } from "../store/store";
 import type { Store } from "../store/store";
 
 export class ViewList {
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
     store.watch((state) => state.hello?.views ?? [], (views) => this.list(views), sameJson);
-    store.watch((state) => [state.looks, state.chosenView, state.coarser], () => this.show(), sameJson);
+    store.watch((state) => [state.looks, state.chosenView, state.coarser], () => this.show(), sameParts);
   }
 
   private list(views: readonly ViewInformation[]): void {

@@ -1,18 +1,21 @@
 /** The scalar bars: what the colours in the picture stand for. A number typed at the end of one fixes its range. */
-import { element, write } from "../dom";
-import { readNumber, within, words } from "../number";
+import { element, markWrong, write } from "../dom";
+import { exactCell } from "../exact";
+import type { ExactCell } from "../exact";
+import { readNumber, whyNoNumber, within, words } from "../number";
 import { colourMap, componentNames, gradient } from "./colour";
 import { valueAt } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
 
 const TICKS = 6;
+const HINT = "Type a number to fix the range";
 
 /** What a bar is called: its field, and the component of a vector. */
 export interface BarText { title: string; unit: string | null }
 
 export class ScalarBars {
-  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; range: Range; typed: (range: Range) => void }>();
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; cells: ExactCell[]; range: Range; typed: (range: Range) => void; name: (text: BarText) => void }>();
 
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
@@ -30,32 +33,47 @@ export class ScalarBars {
 
   private update(bar: Bar): void {
     const shown = this.shown.get(bar.key) ?? this.make(bar);
-    const { ticks, ends } = shown;
+    const { ticks, ends, cells } = shown;
     shown.range = bar.range;
     shown.typed = (range) => this.fix(bar.views, range);
+    shown.name(this.describe(bar));
     const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
     ticks.forEach((tick, i) => write(tick, at(i + 1)));
     ends.forEach((input, i) => {
-      if (document.activeElement !== input) input.value = at(i === 0 ? TICKS - 1 : 0);
+      if (document.activeElement === input) return;
+      cells[i]!.write(bar.range[i]!, at(i === 0 ? TICKS - 1 : 0));
+      markWrong(input, "", HINT);
     });
   }
 
   private make(bar: Bar): NonNullable<ReturnType<typeof this.shown.get>> {
-    const { title, unit } = this.describe(bar);
-    const end = (label: string): HTMLInputElement => element("input", {
-      type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${title}: ${label}`, title: "Type a number to fix the range", onchange: () => {
-        const [low, high] = [readNumber(ends[0].value) ?? shown.range[0], readNumber(ends[1].value) ?? shown.range[1]];
-        if (low < high) shown.typed([low, high]);
+    const end = (): HTMLInputElement => element("input", {
+      type: "text", inputmode: "decimal", autocomplete: "off", title: HINT, onchange: () => {
+        // An end that is left empty is as it was.
+        const typed = ends.map((input, i) => cells[i]!.untouched() ?? (input.value.trim() === "" ? shown.range[i]! : readNumber(input.value)));
+        ends.forEach((input, i) => markWrong(input, typed[i] === null ? whyNoNumber(input.value) : "", HINT));
+        const [low, high] = typed as [number | null, number | null];
+        if (low !== null && high !== null && low < high) shown.typed([low, high]);
       },
     });
-    const ends: [HTMLInputElement, HTMLInputElement] = [end("lowest value"), end("highest value")];
+    const ends: [HTMLInputElement, HTMLInputElement] = [end(), end()];
+    const cells = ends.map(exactCell);
     const ticks = Array.from({ length: TICKS - 2 }, () => element("li"));
     const colours = element("div", { class: "colours" });
     colours.style.background = gradient(colourMap(bar.look.map), "to top");
-    const root = element("div", { class: "scalar-bar", role: "group", "aria-label": title }, element("div", { class: "title" }, title, unit ? element("small", {}, unit) : null),
+    const [title, unit] = [element("span"), element("small")];
+    const root = element("div", { class: "scalar-bar", role: "group" }, element("div", { class: "title" }, title, unit),
       element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))));
     this.root.append(root);
-    const shown = { root, ticks, ends, range: bar.range, typed: (_: Range): void => undefined };
+    // What the run says of a field may come later than its values.
+    const name = (text: BarText): void => {
+      root.setAttribute("aria-label", text.title);
+      ["lowest value", "highest value"].forEach((label, i) => ends[i]!.setAttribute("aria-label", `${text.title}: ${label}`));
+      write(title, text.title);
+      write(unit, text.unit ?? "");
+      unit.hidden = !text.unit;
+    };
+    const shown = { root, ticks, ends, cells, range: bar.range, name, typed: (_: Range): void => undefined };
     this.shown.set(bar.key, shown);
     return shown;
   }

@@ -32,6 +32,8 @@ export interface PreviewEvents {
   skeleton(bones: Bones | null, reason: string): void;
   /** The points of the surface that were asked for, in the reference and in the shape that is. */
   points(reference: Float64Array, now: Float32Array): void;
+  /** The points that were asked for do not come. */
+  noPoints(reason: string): void;
   /** An edit that cannot be previewed, or nothing to preview it with. */
   failed(kind: FailureKind | "surface-missing", reason: string): void;
   cleared(): void;
@@ -51,6 +53,8 @@ export class Preview {
   private waiting: Wish | null = null;
   private wanted: Json[] | null = null;
   private wantedPoints: Json[] | null = null;
+  /** Whether points were asked for that have not come. */
+  private isAwaitingPoints = false;
   /** Of the last look at a shape: when it was over, and how long it took. */
   private looked = { at: 0, took: 0 };
   private lookedSince = 0;
@@ -76,6 +80,8 @@ export class Preview {
     this.state = "absent";
     this.wanted = null;
     this.wantedPoints = null;
+    // What was asked of the one before is not answered any more.
+    this.withoutPoints("the simulation has another surface now");
     this.clear();
   }
 
@@ -93,8 +99,9 @@ export class Preview {
 
   /** Asks for the points of the surface, in the reference and in the shape that `stack` has made. */
   surfacePoints(stack: Json[]): void {
-    if (this.known === null) return;
+    if (this.known === null) return this.events.noPoints("the simulation has no reference surface");
     this.wantedPoints = stack;
+    this.isAwaitingPoints = true;
     this.next();
   }
 
@@ -178,7 +185,14 @@ export class Preview {
     if (this.wanted !== null) this.events.skeleton(null, reason);
     this.wanted = null;
     this.wantedPoints = null;
+    this.withoutPoints(reason);
     if (isWanted) this.events.failed(kind, reason);
+  }
+
+  private withoutPoints(reason: string): void {
+    if (!this.isAwaitingPoints) return;
+    this.isAwaitingPoints = false;
+    this.events.noPoints(reason);
   }
 
   private answer(answer: PreviewAnswer): void {
@@ -193,8 +207,13 @@ export class Preview {
       else this.events.skeleton(answer.bones, "");
     } else if ("shape" in answer) {
       if (answer.shape !== this.known) return;
-      if ("error" in answer) this.events.failed(answer.kind, answer.error);
-      else this.events.points(answer.reference, answer.points);
+      if ("error" in answer) {
+        this.withoutPoints(answer.error);
+        this.events.failed(answer.kind, answer.error);
+      } else {
+        this.isAwaitingPoints = false;
+        this.events.points(answer.reference, answer.points);
+      }
     } else if ("check" in answer) {
       this.computing = null;
       const at = performance.now();

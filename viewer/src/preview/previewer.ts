@@ -26,6 +26,8 @@ export class Previewer {
   private bones = false;
   private faulty: Uint32Array | undefined;
   private readonly surfaceListeners = new Set<(surface: ShownPoints) => void>();
+  /** Who waits for the points once. */
+  private waiting: { resolve: (surface: ShownPoints) => void; reject: (reason: Error) => void }[] = [];
   private shown: PreviewSurface | null = null;
 
   constructor(
@@ -35,7 +37,7 @@ export class Previewer {
     store.watch((state) => state.hello?.surface ?? null, (surface) => this.preview?.offer(surface), sameJson);
     store.watch((state) => state.hello?.stack ?? [], () => {
       if (this.bones) this.showSkeleton(true);
-      if (this.surfaceListeners.size > 0) this.started().surfacePoints(this.stack);
+      if (this.surfaceListeners.size > 0 || this.waiting.length > 0) this.started().surfacePoints(this.stack);
       this.show(this.wished);
     }, sameJson);
     store.watch(wishedStack, (wished) => this.show(wished), sameJson);
@@ -52,15 +54,19 @@ export class Previewer {
     this.started().surfacePoints(this.stack);
   }
 
-  /** The points of the surface in the shape that is now. */
+  /** The points of the surface in the shape that is now; rejected where they do not come. */
   surfaceNow(): Promise<ShownPoints> {
-    return new Promise((resolve) => {
-      const once = (surface: ShownPoints): void => {
-        this.surfaceListeners.delete(once);
-        resolve(surface);
-      };
-      this.watchSurface(once);
+    return new Promise((resolve, reject) => {
+      this.waiting.push({ resolve, reject });
+      this.started().surfacePoints(this.stack);
     });
+  }
+
+  /** Ends the waiting for points. */
+  private answerWaiting(answer: (one: (typeof this.waiting)[number]) => void): void {
+    const { waiting } = this;
+    this.waiting = [];
+    waiting.forEach(answer);
   }
 
   /** Shows the skeleton, by which the shape can be dragged, or takes it away. */
@@ -93,12 +99,18 @@ export class Previewer {
   private started(): Preview {
     if (this.preview) return this.preview;
     const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });
-    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.fail(String(error)));
+    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.failWhole(String(error)));
     this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
       surface: (surface) => this.takeSurface(surface),
       shape: (shape) => this.take(shape),
       checked: (faults, isNewest) => this.judge(faults, isNewest),
-      points: (reference, points) => { if (this.shown) for (const listener of [...this.surfaceListeners]) listener({ ...this.shown, reference, points }); },
+      points: (reference, points) => {
+        if (!this.shown) return;
+        const surface = { ...this.shown, reference, points };
+        for (const listener of [...this.surfaceListeners]) listener(surface);
+        this.answerWaiting(({ resolve }) => resolve(surface));
+      },
+      noPoints: (reason) => this.answerWaiting(({ reject }) => reject(new Error(reason))),
       skeleton: (bones, reason) => {
         if (!this.bones) return;
         this.scene.setBones(bones);
@@ -112,7 +124,7 @@ export class Previewer {
         this.say(NO_PREVIEW);
       },
     });
-    worker.addEventListener("error", (event) => this.fail(event.message || "the geometry kernel could not be started"));
+    worker.addEventListener("error", (event) => this.failWhole(event.message || "the geometry kernel could not be started"));
     this.preview.offer(this.surface);
     return this.preview;
   }
@@ -148,6 +160,12 @@ export class Previewer {
     if (isNewest) this.say({ ...this.store.state.preview, faults: faults?.text ?? "" });
     if (faults || this.faulty) this.scene.setPreview(this.points, faults?.triangles);
     this.faulty = faults?.triangles;
+  }
+
+  /** Nothing that was asked for comes. */
+  private failWhole(reason: string): void {
+    this.fail(reason);
+    this.answerWaiting(({ reject }) => reject(new Error(reason)));
   }
 
   private fail(reason: string): void {

@@ -1,6 +1,6 @@
 /** What can happen: from the simulation, or from the person at the page. */
 import type { ConnectionState } from "../connection/connection";
-import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, PipelineChange, Played, RunEnd, Status } from "../connection/protocol";
+import type { FieldInformation, ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, PipelineChange, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { LanguageError } from "../kernel/language";
 import type { Look } from "./looks";
@@ -20,6 +20,8 @@ export type Action =
   | { type: "precision"; view: string; coarser: number }
   | { type: "status"; status: Status; at: number }
   | { type: "frame"; view: string; cycle: number }
+  /** The fields that the frames of a view carry from now on. */
+  | { type: "carries"; view: string; fields: readonly FieldInformation[] }
   | { type: "order"; status: OrderStatus }
   | { type: "played"; played: Played }
   | { type: "end"; end: RunEnd }

@@ -1,30 +1,41 @@
-/** What the page keeps over a reload: how views look, the dock, the theme, whether the tour was seen, the person's name. Nothing of the run, and no secret. */
+/**
+ * What the page keeps over a reload: the theme, whether the tour was seen, the person's name; and for each run of a relay by itself how views
+ * look, and the dock. Nothing of the run, and no secret.
+ */
 import type { Theme } from "../picture/theme";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
 
 const KEY = "tombolo-page";
 /** Longer than anything that the page writes. */
-const LONGEST = 100_000;
+const LONGEST = 200_000;
 /** The most characters of a name. */
 export const LONGEST_NAME = 40;
 
 /** The dock: whether it is open, and which monitors are plotted; null for those of the beginning. */
 export interface DockState { open: boolean; chosen: readonly string[] | null }
 
-interface Content { looks: Looks; dock: DockState; theme: Theme | null; toured: boolean; name: string }
+/** For all runs. */
+interface Page { theme: Theme | null; toured: boolean; name: string }
+/** For the run at one path. */
+interface Run { looks: Looks; dock: DockState }
 
 export class Kept {
-  private readonly content: Content;
+  private readonly content: Page;
+  private readonly run: Run;
+  private readonly runKey: string;
 
-  constructor(private readonly storage: Pick<Storage, "getItem" | "setItem">) {
-    this.content = read(storage);
+  /** `path` tells the runs of a relay from each other. */
+  constructor(private readonly storage: Pick<Storage, "getItem" | "setItem">, path: string) {
+    this.runKey = `${KEY} ${path}`;
+    this.content = readPage(storage);
+    this.run = readRun(storage, this.runKey);
   }
 
-  get looks(): Looks { return this.content.looks; }
-  set looks(looks: Looks) { this.keep("looks", looks); }
-  get dock(): DockState { return this.content.dock; }
-  set dock(dock: DockState) { this.keep("dock", dock); }
+  get looks(): Looks { return this.run.looks; }
+  set looks(looks: Looks) { this.keepRun("looks", looks); }
+  get dock(): DockState { return this.run.dock; }
+  set dock(dock: DockState) { this.keepRun("dock", dock); }
   /** The theme that was chosen here; null for that of the system. */
   get theme(): Theme | null { return this.content.theme; }
   set theme(theme: Theme | null) { this.keep("theme", theme); }
@@ -37,10 +48,19 @@ export class Kept {
   get name(): string { return this.content.name; }
   set name(name: string) { this.keep("name", name); }
 
-  private keep<K extends keyof Content>(key: K, value: Content[K]): void {
+  private keep<K extends keyof Page>(key: K, value: Page[K]): void {
     this.content[key] = value;
+    this.store(KEY, this.content);
+  }
+
+  private keepRun<K extends keyof Run>(key: K, value: Run[K]): void {
+    this.run[key] = value;
+    this.store(this.runKey, this.run);
+  }
+
+  private store(key: string, content: Page | Run): void {
     try {
-      this.storage.setItem(KEY, JSON.stringify(this.content));
+      this.storage.setItem(key, JSON.stringify(content));
     } catch {
       // A browser that keeps nothing, or is full: the page works all the same.
     }
@@ -48,20 +68,25 @@ export class Kept {
 }
 
 /** Rubbish, or what another version has written, counts as nothing. */
-function read(storage: Pick<Storage, "getItem">): Content {
-  let found: Partial<Record<keyof Content, unknown>> = {};
+function read(storage: Pick<Storage, "getItem">, key: string): { readonly [key: string]: unknown } {
   try {
-    const text = storage.getItem(KEY) ?? "";
+    const text = storage.getItem(key) ?? "";
     const parsed: unknown = text.length > LONGEST ? null : JSON.parse(text || "null");
-    if (typeof parsed === "object" && parsed !== null) found = parsed;
+    if (typeof parsed === "object" && parsed !== null) return { ...parsed };
   } catch {
     // As above.
   }
-  const { open, chosen } = (typeof found.dock === "object" && found.dock !== null ? found.dock : {}) as { open?: unknown; chosen?: unknown };
-  const names = Array.isArray(chosen) && chosen.every((key) => typeof key === "string") ? (chosen as string[]) : null;
-  return {
-    looks: readLooks(found.looks), dock: { open: open !== false, chosen: names },
-    theme: found.theme === "dark" || found.theme === "light" ? found.theme : null, toured: found.toured === true,
-    name: typeof found.name === "string" ? found.name.slice(0, LONGEST_NAME) : "",
-  };
+  return {};
+}
+
+function readPage(storage: Pick<Storage, "getItem">): Page {
+  const { theme, toured, name } = read(storage, KEY);
+  return { theme: theme === "dark" || theme === "light" ? theme : null, toured: toured === true, name: typeof name === "string" ? name.slice(0, LONGEST_NAME) : "" };
+}
+
+function readRun(storage: Pick<Storage, "getItem">, key: string): Run {
+  const { looks, dock } = read(storage, key);
+  const { open, chosen } = (typeof dock === "object" && dock !== null ? dock : {}) as { open?: unknown; chosen?: unknown };
+  const names = Array.isArray(chosen) && chosen.every((name) => typeof name === "string") ? (chosen as string[]) : null;
+  return { looks: readLooks(looks), dock: { open: open !== false, chosen: names } };
 }

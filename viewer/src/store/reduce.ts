@@ -1,5 +1,5 @@
 /** The next state, of the present one and what happened. */
-import type { Hello, Json } from "../connection/protocol";
+import type { FieldInformation, Hello, Json } from "../connection/protocol";
 import { describeOrder } from "../form/describe";
 import { ROLES } from "../form/schema";
 import type { Values } from "../form/schema";
@@ -50,6 +50,7 @@ function after(state: State, action: Action): State {
       return { ...state, status, progress: isSame ? state.progress : [...state.progress, { cycle: status.cycle, at }].slice(-LONGEST_PROGRESS) };
     }
     case "frame": return { ...state, frames: withFrame(state.frames, action.view, action.cycle) };
+    case "carries": return withCarried(state, action.view, action.fields);
     case "order": {
       // What another orders leaves nothing that an undo of ours could bring back.
       const isOurs = state.orders.some((order) => order.id === action.status.id);
@@ -75,7 +76,10 @@ function after(state: State, action: Action): State {
     case "unreadable": return { ...state, errors: [...state.errors, action.text].slice(-LONGEST_ERRORS) };
     case "schema": return withSchema(state, action.form, action.settings);
     case "order sent": return withOrderSent(state, action.id, action.order, action.at);
-    case "look": return { ...state, looks: withLook(state.looks, action.view, action.look) };
+    case "look": {
+      const views = action.view === null ? (state.hello?.views ?? []).map(({ name }) => name) : [action.view];
+      return { ...state, looks: withLook(state.looks, views, action.look) };
+    }
     case "view chosen": return { ...state, chosenView: action.view };
     case "part": {
       const parts = withPart(state.selection.parts, action.feature, action.part);
@@ -156,10 +160,18 @@ function withoutLostEdit(state: State, next: State): State {
 }
 
 function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
-  const looks = looksOf(views, fields, state.looks);
-  const known = state.chosenView !== null && Object.hasOwn(looks, state.chosenView);
-  const coloured = views.find((view) => own(looks, view.name)?.field != null) ?? views[0];
-  return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known ? state.chosenView : coloured?.name ?? null };
+  const looks = looksOf(views, fields, state.looks, state.carried);
+  const isColoured = (name: string): boolean => own(looks, name)?.field != null;
+  const known = views.some(({ name }) => name === state.chosenView);
+  // Before there were fields no view was worth more than another.
+  const isFirstChoice = fields.length > 0 && state.hello?.fields.length === 0 && !isColoured(state.chosenView ?? "");
+  const coloured = views.find(({ name }) => isColoured(name)) ?? views[0];
+  return { looks: sameJson(looks, state.looks) ? state.looks : looks, chosenView: known && !isFirstChoice ? state.chosenView : coloured?.name ?? null };
+}
+
+function withCarried(state: State, view: string, fields: readonly FieldInformation[]): State {
+  const next = { ...state, carried: { ...state.carried, [view]: fields } };
+  return next.hello ? { ...next, ...viewsOf(next, next.hello) } : next;
 }
 
 function withSchema(state: State, form: State["form"], settings: Values): State {

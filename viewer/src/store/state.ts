@@ -2,7 +2,7 @@
 import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
-import type { Looks } from "./looks";
+import type { Carried, Looks } from "./looks";
 import { NO_PIPELINES } from "./pipeline-drafts";
 import type { PipelinesState } from "./pipeline-drafts";
 
@@ -78,7 +78,9 @@ export interface State {
   /** When the run was at which cycle, by this page's clock; the newest last. */
   progress: readonly { cycle: number; at: number }[];
   frames: Frames;
-  /** How each view looks, and the one whose look is being changed. */
+  /** The fields that each view carries, as its frames say. */
+  carried: Carried;
+  /** How each view looks, also one that is no more and may come back; and the one whose look is being changed. */
   looks: Looks;
   chosenView: string | null;
   /** By view, within how many times the error that was asked for its values are, where the connection does not carry it as it is. */
@@ -106,7 +108,7 @@ export interface State {
   pipelines: PipelinesState;
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
-  /** What went wrong on the way here: frames or messages that could not be read, newest last. */
+  /** What went wrong: frames or messages that could not be read, and what has failed in the page; newest last. */
   errors: readonly string[];
 }
 
@@ -118,7 +120,7 @@ export const INITIAL: State = {
   hello: null, status: null, played: null, end: null,
   progress: [],
   frames: { count: 0, cycle: null, views: {} },
-  looks: {}, chosenView: null, coarser: {},
+  carried: {}, looks: {}, chosenView: null, coarser: {},
   selection: { parts: {}, hovered: null },
   form: null,
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },

@@ -7,8 +7,14 @@ export class Store<S, A> {
   private readonly waiting: A[] = [];
   private busy = false;
 
-  /** `reduce` makes the next state; it changes nothing, and gives the same object back where nothing is different. */
-  constructor(private current: S, private readonly reduce: (state: S, action: A) => S) {}
+  /**
+   * `reduce` makes the next state; it changes nothing, and gives the same object back where nothing is different. `failed` is told of what a
+   * watcher or `reduce` throws, which keeps nobody else from going on; where nobody is told, it is thrown in a task of its own.
+   */
+  constructor(
+    private current: S, private readonly reduce: (state: S, action: A) => S,
+    private readonly failed: (error: unknown) => void = (error) => { setTimeout(() => { throw error; }); },
+  ) {}
 
   get state(): S {
     return this.current;
@@ -19,15 +25,20 @@ export class Store<S, A> {
     this.waiting.push(action);
     if (this.busy) return;
     this.busy = true;
+    for (let next = this.waiting.shift(); next !== undefined; next = this.waiting.shift()) {
+      const action = next;
+      const before = this.current;
+      this.attempt(() => { this.current = this.reduce(before, action); });
+      if (this.current !== before) for (const watcher of [...this.watchers]) this.attempt(watcher);
+    }
+    this.busy = false;
+  }
+
+  private attempt(work: () => void): void {
     try {
-      for (let next = this.waiting.shift(); next !== undefined; next = this.waiting.shift()) {
-        const before = this.current;
-        this.current = this.reduce(before, next);
-        if (this.current !== before) for (const watcher of [...this.watchers]) watcher();
-      }
-    } finally {
-      this.busy = false;
-      this.waiting.length = 0;
+      work();
+    } catch (error) {
+      this.failed(error);
     }
   }
 
@@ -58,3 +69,6 @@ export function derived<S, T>(parts: (state: S) => readonly unknown[], compute: 
 
 /** Whether two values are the same as JSON: for what a selector makes anew each time. */
 export const sameJson = (a: unknown, b: unknown): boolean => Object.is(a, b) || JSON.stringify(a) === JSON.stringify(b);
+
+/** Whether all parts of one list are those of the other: for a selector that takes several parts of the state. */
+export const sameParts = (a: readonly unknown[], b: readonly unknown[]): boolean => a.length === b.length && a.every((part, i) => Object.is(part, b[i]));

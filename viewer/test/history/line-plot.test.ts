@@ -41,6 +41,15 @@ describe("the line of the plot", () => {
     expect(asked).toEqual([{ pipelines: { set: [{ ...own, stages: [{ probe: { line: { from: [0, 0, 0], to: [2, 0, 0], count: 1001 } } }, own.stages[1]] }] } }]);
   });
 
+  it("keeps the coordinates that nobody has typed, to the last bit", async () => {
+    const { asked, plot } = await plotted(lineBetween([1234.56789, 1 / 3, 0.1], [2000.00001, -1e-7, 5]));
+    const inputs = [...plot.body.querySelectorAll("input")];
+    expect(inputs.map(({ value }) => value)).toEqual(["1234.57", "0.333333", "0.1", "2000", "−1e−7", "5"]);
+    inputs[2]!.value = "0.2";
+    inputs[2]!.dispatchEvent(new Event("change"));
+    expect(asked).toEqual([{ pipelines: { set: [lineBetween([1234.56789, 1 / 3, 0.2], [2000.00001, -1e-7, 5])] } }]);
+  });
+
   it("does not take the place of a pipeline of its name that is something else", async () => {
     const { store, asked, plot } = await plotted({ name: "line", stages: [{ slice: { origin: [0, 0, 0], normal: [1, 0, 0] } }, { stream: {} }] });
     plot.take([0, 0, 0], [2, 0, 0]);

@@ -3,16 +3,17 @@ import type uPlot from "uplot";
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { Dock } from "../../src/history/dock";
 import { HistoryPlot } from "../../src/history/plot";
-import { History } from "../../src/history/series";
+import { labelled, padded } from "../../src/history/plotting";
+import { History, seriesKey } from "../../src/history/series";
 
 /** Stands in for a plot, which needs a canvas. */
-const made = vi.hoisted(() => [] as { options: uPlot.Options; redraw: () => void }[]);
+const made = vi.hoisted(() => [] as { options: uPlot.Options; data: uPlot.AlignedData; redraw: () => void }[]);
 vi.mock("uplot", () => ({
   default: class {
     redraw = vi.fn();
     setData = vi.fn();
     setScale = vi.fn();
-    constructor(readonly options: uPlot.Options) { made.push(this); }
+    constructor(readonly options: uPlot.Options, readonly data: uPlot.AlignedData) { made.push(this); }
   },
 }));
 
@@ -43,5 +44,64 @@ describe("the plots below the picture", () => {
     expect(redraw).not.toHaveBeenCalled();
     dock.recolour();
     expect(redraw).toHaveBeenCalledOnce();
+  });
+
+  it("have axes as wide as their labels, which are long where the range is small", () => {
+    const history = new History();
+    for (const cycle of [1, 2]) history.add("health", cycle, cycle, { "quality.min": 0.5 });
+    new HistoryPlot(history, null, () => undefined).show(true);
+    const { size, values } = made[0]!.options.axes![1]! as unknown as { size: (...of: unknown[]) => number; values: (plot: null, ticks: number[]) => string[] };
+    const plot = { ctx: { font: "", measureText: (text: string) => ({ width: 6 * text.length }) }, axes: [{}, { font: ["11px sans-serif", 11], ticks: { size: 10 }, gap: 5 }] };
+    expect([size(plot, null, 1, 0), size(plot, values(null, [0, 1, 2]), 1, 1)]).toEqual([58, 58]);
+    expect(plot.ctx.font).toBe("11px sans-serif");
+    const labels = values(null, [101325.0001, 101325.0002, 101325.0003]);
+    expect(labels).toEqual(["101325.0001", "101325.0002", "101325.0003"]);
+    expect(size(plot, labels, 1, 2)).toBe(81);
+  });
+
+  it("show no smaller part of values than their labels can tell apart", () => {
+    const of = (low: number, high: number): number[] => padded(null as never, low, high);
+    const [low, high] = of(101325, 101325 + 1e-10) as [number, number];
+    expect((high - low) / 101325).toBeCloseTo(1e-9, 12);
+    const ticks = [0, 1, 2, 3, 4].map((i) => low + ((high - low) * i) / 4);
+    expect(new Set(labelled(null as never, ticks)).size).toBe(5);
+    expect(of(1, 2)).toEqual([0.94, 2.06]);
+    expect([of(0, 0), of(-4, -4)]).toEqual([[-1, 1], [-4.4, -3.6]]);
+  });
+
+  it("break where a monitor has said what is no number, and go on where only another has spoken", () => {
+    const history = new History();
+    for (const [cycle, p] of [[1, 2], [2, NaN], [4, 3]] as const) history.add("a", cycle, cycle, { p });
+    history.add("b", 3, 3, { q: 1 });
+    const plot = new HistoryPlot(history, [seriesKey("a", "p"), seriesKey("b", "q")], () => undefined);
+    document.body.append(plot.body);
+    plot.show(true);
+    const [{ options, data }] = made as [typeof made[0]];
+    expect(options.series.map(({ spanGaps }) => spanGaps ?? false)).toEqual([false, false, false]);
+    expect(data).toEqual([[1, 2, 3, 4], [2, null, undefined, 3], [undefined, undefined, 1, undefined]]);
+  });
+
+  it("show what is seen at first where nothing is there of what was chosen, and nothing where that was wished", () => {
+    const history = new History();
+    for (const cycle of [1, 2]) history.add("flow", cycle, cycle, { drop: 0.5, other: 1 });
+    const drawn = (picked: string[]): (string | undefined)[] => {
+      made.length = 0;
+      new HistoryPlot(history, picked, () => undefined).show(true);
+      return made.flatMap(({ options }) => options.series.slice(1).map(({ label }) => label as string));
+    };
+    expect(drawn([seriesKey("gone", "x")])).toEqual(["drop"]);
+    expect(drawn([seriesKey("gone", "x"), seriesKey("flow", "other")])).toEqual(["other"]);
+    expect(drawn([])).toEqual([]);
+  });
+
+  it("keep no pins, which are gone with the page", () => {
+    const history = new History();
+    const pin = seriesKey("probe 1, pressure", "pressure"), drop = seriesKey("flow", "drop");
+    for (const [source, name] of [["flow", "drop"], ["probe 1, pressure", "pressure"]] as const) history.add(source, 1, 1, { [name]: 1 });
+    const kept: (readonly string[] | null)[] = [];
+    const plot = new HistoryPlot(history, null, (chosen) => { kept.push(chosen); });
+    plot.choose(pin);
+    new HistoryPlot(history, [], (chosen) => { kept.push(chosen); }).choose(pin);
+    expect(kept).toEqual([[drop], null]);
   });
 });

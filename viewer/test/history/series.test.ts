@@ -8,9 +8,21 @@ describe("the history", () => {
     for (const cycle of [3, 6]) history.add("b", cycle, cycle / 10, { q: -cycle, r: null });
     const keys = [seriesKey("a", "p"), seriesKey("b", "q"), seriesKey("b", "r")];
     expect(history.table(keys)).toEqual({
-      cycles: [2, 3, 4, 6], times: [0.2, 0.3, 0.4, 0.6], columns: [[2, null, 4, 6], [null, -3, null, -6], [null, null, null, null]],
+      cycles: [2, 3, 4, 6], times: [0.2, 0.3, 0.4, 0.6], columns: [[2, undefined, 4, 6], [undefined, -3, undefined, -6], [undefined, null, undefined, null]],
     });
     expect([history.at(keys[0]!, 5), history.at(keys[1]!, 5), history.at(keys[1]!, 2), history.at("none", 5)]).toEqual([4, -3, null, null]);
+  });
+
+  it("has no value where a monitor says that it is no number, however good the last one was", () => {
+    const history = new History();
+    const key = seriesKey("a", "p");
+    history.add("a", 1, 1, { p: 1 });
+    for (const [cycle, p] of [[2, null], [3, NaN]] as const) history.add("a", cycle, cycle, { p });
+    history.add("a", 4, 4, { q: 5 });
+    expect([1, 2, 3, 4].map((cycle) => history.at(key, cycle))).toEqual([1, null, null, null]);
+    expect(history.table([key]).columns).toEqual([[1, null, null, undefined]]);
+    expect(history.at(seriesKey("a", "q"), 3)).toBeNull();
+    expect(compare(history, key, 3, [{ cycle: 1, label: "pinch" }])).toMatchObject({ value: null, before: 1, difference: null });
   });
 
   it("takes a cycle once, and begins anew where a run goes back", () => {

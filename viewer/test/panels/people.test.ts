@@ -25,7 +25,7 @@ describe("who is here", () => {
   beforeEach(() => {
     openDocument();
     made = page();
-    kept = new Kept({ getItem: () => JSON.stringify({ name: "Anna" }), setItem: () => undefined });
+    kept = new Kept({ getItem: () => JSON.stringify({ name: "Anna" }), setItem: () => undefined }, "/");
     [copied, isCopying] = [[], true];
     new StatusBar(made.store, made.commands);
     new WheelPanel(made.store, made.commands);

@@ -43,6 +43,27 @@ describe("the slider of a recording", () => {
     expect(slider().value).toBe("31");
   });
 
+  it("is let go of with the pointer, also where a drag ends as it began", () => {
+    made.greet({ recording });
+    for (const [end, bubbles] of [["pointerup", true], ["pointercancel", true], ["blur", false]] as const) {
+      made.store.dispatch({ type: "played", played: played({}) });
+      const sent = made.sent.length;
+      for (const value of ["30", "12"]) {
+        slider().value = value;
+        slider().dispatchEvent(new Event("input"));
+      }
+      made.store.dispatch({ type: "played", played: played({ seconds: 30 }) });
+      expect(slider().value, end).toBe("12");
+      slider().dispatchEvent(new Event(end, { bubbles }));
+      // The place where it was let go of is asked for, and once.
+      expect(made.sent.at(-1), end).toMatchObject({ play: { seek: { seconds: 12 } } });
+      slider().dispatchEvent(new Event("change"));
+      expect(made.sent.length - sent, end).toBeLessThanOrEqual(2);
+      made.store.dispatch({ type: "played", played: played({ seconds: 13 }) });
+      expect(slider().value, end).toBe("13");
+    }
+  });
+
   it("pauses, goes on, and begins again at the end", () => {
     made.greet({ recording });
     made.store.dispatch({ type: "played", played: played({}) });

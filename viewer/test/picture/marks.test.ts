@@ -54,24 +54,37 @@ describe("marks over the picture", () => {
 });
 
 describe("what the page keeps over a reload", () => {
+  /** A storage, in which a text stands under each key at first. */
   const storage = (text: string | null) => {
-    const kept = { text };
-    return { kept, getItem: () => kept.text, setItem: (_: string, value: string) => { kept.text = value; } };
+    const kept = new Map<string, string>();
+    return { getItem: (key: string) => kept.get(key) ?? text, setItem: (key: string, value: string) => { kept.set(key, value); } };
   };
+  it("is of one run of a relay where it is about its views, and of all where it is about the person", () => {
+    const place = storage(null);
+    const page = new Kept(place, "/tombolo/a/");
+    page.looks = looksOf([{ name: "cut", kind: "slice" }], [], {});
+    page.dock = { open: false, chosen: ["a"] };
+    page.theme = "light";
+    const other = new Kept(place, "/tombolo/b/");
+    expect([other.looks, other.dock, other.theme]).toEqual([{}, { open: true, chosen: null }, "light"]);
+    other.dock = { open: true, chosen: [] };
+    expect(new Kept(place, "/tombolo/a/").dock).toEqual(page.dock);
+  });
+
   it("comes back, and rubbish counts as nothing", () => {
     const place = storage(null);
     const looks = looksOf([{ name: "cut", kind: "slice" }], [{ name: "velocity", association: "vertex", components: 3 }], {});
-    const page = new Kept(place);
+    const page = new Kept(place, "/");
     page.looks = { cut: { ...looks.cut!, map: "cividis", opacity: 0.5 } };
     page.dock = { open: false, chosen: ["a"] };
     page.theme = "light";
-    const again = new Kept(place);
+    const again = new Kept(place, "/");
     expect([again.looks, again.dock, again.theme]).toEqual([page.looks, page.dock, "light"]);
-    for (const text of ["", "{", "[]", "7", '{"looks":{"cut":{"visible":1}},"dock":5,"theme":"pink"}', "x".repeat(200_000)]) {
-      const other = new Kept(storage(text));
+    for (const text of ["", "{", "[]", "7", '{"looks":{"cut":{"visible":1}},"dock":5,"theme":"pink"}', "x".repeat(400_000)]) {
+      const other = new Kept(storage(text), "/");
       expect([other.looks, other.dock, other.theme]).toEqual([{}, { open: true, chosen: null }, null]);
     }
-    const full = new Kept({ getItem: () => null, setItem: () => { throw new Error("full"); } });
+    const full = new Kept({ getItem: () => null, setItem: () => { throw new Error("full"); } }, "/");
     full.theme = "dark";
     expect(full.theme).toBe("dark");
   });

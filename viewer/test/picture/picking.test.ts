@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { extremes, scalars } from "../../src/picture/colour";
-import { digits, readNumber, seconds, within } from "../../src/number";
+import { digits, readNumber, seconds, whyNoNumber, within } from "../../src/number";
 import { bounds, featureEdges } from "../../src/picture/picking";
 
 // Two parallel unit squares, at z = 0 and z = 1, of two triangles each.
@@ -44,6 +44,11 @@ describe("numbers", () => {
   });
   it("are read back", () => {
     expect([" 1.5 ", "−2", "1,5", ".5", "1e-3", "x", "", "1e999"].map(readNumber)).toEqual([1.5, -2, 1.5, 0.5, 0.001, null, null, null]);
+    expect(["1,500", "-12,345", "1,234,567", "1.234,5"].map(readNumber)).toEqual([null, null, null, null]);
+    expect(["0,125", "1234,567", "12,3456", "1,50", "-0,125"].map(readNumber)).toEqual([0.125, 1234.567, 12.3456, 1.5, -0.125]);
+    expect(["1,500", "−12,345", "1,234,567", "x", " ", "1,5"].map(whyNoNumber)).toEqual([
+      "“1,500” can be read in two ways: write 1500 or 1.5", "“−12,345” can be read in two ways: write -12345 or -12.345",
+      "“1,234,567” has commas: write 1234567", "“x” is not a number", "is empty", ""]);
     for (const value of [-2.5e-6, -5e-4, 3e-6, -1.25e7, -0.005]) expect(readNumber(digits(value)), digits(value)).toBe(value);
   });
 });

@@ -1,6 +1,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import type { DataFrame, TopologyFrame } from "../../src/connection/protocol";
 import { History, seriesKey } from "../../src/history/series";
+import type { Said } from "../../src/history/series";
 import type { Mark } from "../../src/picture/marks";
 import { Pins } from "../../src/picture/pins";
 import { probeNear, readProbe } from "../../src/picture/probe";
@@ -25,7 +26,7 @@ describe("a pinned place", () => {
     shown = next;
     pins.update();
   };
-  const values = (): (number | null)[] => history.table([seriesKey("probe 1, x", "x")]).columns[0] ?? [];
+  const values = (): Said[] => history.table([seriesKey("probe 1, x", "x")]).columns[0] ?? [];
 
   beforeEach(() => {
     history = new History();

@@ -17,7 +17,7 @@ function setUp(fetchSurface = async () => new ArrayBuffer(8)) {
     return fetchSurface();
   }, {
     surface: () => heard.push("surface"), shape: ({ largest }) => heard.push(`shape ${largest}`),
-    points: (reference) => heard.push(`points ${reference.length / 3}`), checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
+    points: (reference) => heard.push(`points ${reference.length / 3}`), noPoints: (reason) => heard.push(`no points: ${reason}`), checked: (faults) => heard.push(`checked ${faults?.text ?? "sound"}`),
     skeleton: (bones, reason) => heard.push(bones ? `skeleton ${bones.free.length}` : `no skeleton: ${reason}`),
     failed: (kind, reason) => heard.push(`${kind}: ${reason}`), cleared: () => heard.push("cleared"),
   });

@@ -1,8 +1,10 @@
 import { describe, expect, it } from "vitest";
-import type { Json } from "../../src/connection/protocol";
+import type { FieldInformation, Json } from "../../src/connection/protocol";
 import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { looksOf, readLooks } from "../../src/store/looks";
+import type { Looks } from "../../src/store/looks";
 import { appliedOrders } from "../../src/store/orders";
 import { runState, slowLink, whyNotSteering } from "../../src/store/run";
 import { Selection } from "../../src/store/selection";
@@ -177,6 +179,90 @@ describe("orders that have changed the shape", () => {
     expect(appliedOrders(store.state)).toBe(list);
     tell("b", "applying", 1, 9);
     expect(appliedOrders(store.state).map(({ cycle }) => cycle)).toEqual([5, 9]);
+  });
+});
+
+describe("how views look", () => {
+  const VELOCITY = { name: "velocity", association: "vertex" as const, components: 3 };
+  const PRESSURE = { name: "pressure", association: "vertex" as const, components: 1 };
+  const CUT = { name: "cut", kind: "slice" }, SHELL = { name: "shell", kind: "surface" };
+
+  it("is by a field as soon as the run says which it has", () => {
+    const { store, greet } = page({ views: [SHELL, CUT] });
+    expect([store.state.looks.cut!.field, store.state.chosenView]).toEqual([null, "shell"]);
+    greet({ fields: [PRESSURE, VELOCITY] });
+    expect([store.state.looks.cut!.field, store.state.looks.shell!.field, store.state.chosenView]).toEqual(["velocity", null, "cut"]);
+    greet({ fields: [] });
+    expect(store.state.looks.cut!.field).toBe("velocity");
+    greet({ fields: [PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("pressure");
+  });
+
+  it("is by no field where somebody wants none, also after a reload", () => {
+    const { store, greet } = page({ views: [CUT] });
+    store.dispatch({ type: "look", view: "cut", look: { field: null } });
+    greet({ fields: [VELOCITY] });
+    expect(store.state.looks.cut!.field).toBeNull();
+    expect(looksOf([CUT], [VELOCITY], readLooks(JSON.parse(JSON.stringify(store.state.looks)))).cut!.field).toBeNull();
+  });
+
+  it("is by a field that the view carries, where nobody has chosen one", () => {
+    const { store, greet } = page({ views: [CUT], fields: [PRESSURE, VELOCITY] });
+    const carries = (...fields: FieldInformation[]): string | null => {
+      store.dispatch({ type: "carries", view: "cut", fields });
+      return store.state.looks.cut!.field;
+    };
+    expect(store.state.looks.cut!.field).toBe("velocity");
+    expect(carries(PRESSURE)).toBe("pressure");
+    const vorticity = { name: "vorticity", association: "vertex" as const, components: 3 };
+    expect(carries(PRESSURE, vorticity)).toBe("pressure");
+    expect(carries({ ...PRESSURE, name: "quality" }, vorticity)).toBe("vorticity");
+    greet({});
+    expect(store.state.looks.cut!.field).toBe("vorticity");
+    store.dispatch({ type: "look", view: "cut", look: { field: "vorticity" } });
+    expect(carries(VELOCITY)).toBe("vorticity");
+  });
+
+  it("is by the field whose range was chosen, whatever the view carries later", () => {
+    const { store } = page({ views: [CUT], fields: [VELOCITY] });
+    store.dispatch({ type: "look", view: "cut", look: { range: { ...store.state.looks.cut!.range, kind: "fixed" } } });
+    store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("velocity");
+  });
+
+  it("may be told by a frame before the run has said which views there are", () => {
+    const { store, greet } = page();
+    store.dispatch({ type: "carries", view: "cut", fields: [PRESSURE] });
+    greet({ views: [CUT], fields: [VELOCITY, PRESSURE] });
+    expect(store.state.looks.cut!.field).toBe("pressure");
+  });
+
+  it("comes back with a view that was gone", () => {
+    const A = { name: "a", kind: "slice" }, B = { name: "b", kind: "slice" };
+    const { store, greet } = page({ views: [A] });
+    store.dispatch({ type: "look", view: "a", look: { map: "cividis" } });
+    store.dispatch({ type: "view chosen", view: "a" });
+    const before = store.state.looks.a;
+    greet({ views: [] });
+    expect(store.state.chosenView).toBeNull();
+    greet({ views: [B] });
+    expect(store.state.chosenView).toBe("b");
+    // What is done to all views is done to those that are there.
+    store.dispatch({ type: "look", view: null, look: { opacity: 0.5 } });
+    greet({ views: [A, B] });
+    expect([store.state.looks.a, store.state.looks.b!.opacity]).toEqual([before, 0.5]);
+  });
+
+  it("is kept of so many views that are no more, the oldest out", () => {
+    let looks: Looks = {};
+    for (let i = 0; i < 300; i++) looks = looksOf([{ name: `view ${i}`, kind: "slice" }], [], looks);
+    expect(Object.keys(looks)).toEqual(Array.from({ length: 201 }, (_, i) => `view ${i + 99}`));
+  });
+
+  it("leaves the field open over a reload where only something else was chosen", () => {
+    const { store } = page({ views: [CUT] });
+    store.dispatch({ type: "look", view: "cut", look: { opacity: 0.5 } });
+    expect(looksOf([CUT], [VELOCITY], readLooks(JSON.parse(JSON.stringify(store.state.looks)))).cut).toMatchObject({ field: "velocity", opacity: 0.5 });
   });
 });
 

@@ -2,8 +2,8 @@ import { describe, expect, it } from "vitest";
 import { Store, derived } from "../../src/store/store";
 
 type Action = { add: number } | { name: string };
-const make = () => new Store({ count: 0, name: "" }, (state, action: Action) => ("add" in action
-  ? action.add === 0 ? state : { ...state, count: state.count + action.add } : { ...state, name: action.name }));
+const make = (failed?: (error: unknown) => void) => new Store({ count: 0, name: "" }, (state, action: Action) => ("add" in action
+  ? action.add === 0 ? state : { ...state, count: state.count + action.add } : { ...state, name: action.name }), failed);
 
 describe("the store", () => {
   it("tells those who watch a part at once, and only when it is another one", () => {
@@ -28,15 +28,28 @@ describe("the store", () => {
     expect(seen).toEqual(["second saw 0", "second saw 1", "second saw 2"]);
   });
 
-  it("goes on after a watcher that fails", () => {
-    const store = make();
-    let fails = false;
-    store.watch((state) => state.count, () => { if (fails) throw new Error("a defect"); });
-    fails = true;
-    expect(() => store.dispatch({ add: 1 })).toThrow("a defect");
-    fails = false;
+  it("goes on where a watcher fails: the others are called, and what they ask for is done", () => {
+    const failures: unknown[] = [];
+    const store = make((error) => failures.push(error));
+    const seen: number[] = [];
+    store.watch((state) => state.count, (count) => { if (count === 1) throw new Error("a defect"); });
+    store.watch((state) => state.count, (count) => {
+      seen.push(count);
+      if (count === 1) store.dispatch({ add: 4 });
+    });
     store.dispatch({ add: 1 });
-    expect(store.state.count).toBe(2);
+    expect([seen, store.state.count]).toEqual([[0, 1, 5], 5]);
+    expect(failures).toEqual([new Error("a defect")]);
+  });
+
+  it("is as it was after an action that cannot be taken, and takes the next", () => {
+    const failures: unknown[] = [];
+    const store = new Store(0, (count, by: number) => {
+      if (by < 0) throw new Error("a defect");
+      return count + by;
+    }, (error) => failures.push(error));
+    for (const by of [1, -1, 2]) store.dispatch(by);
+    expect([store.state, failures.length]).toEqual([3, 1]);
   });
 
   it("computes what is derived only where its parts have changed", () => {

@@ -1,0 +1,44 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import { ScalarBars } from "../../src/picture/bars";
+import type { BarText } from "../../src/picture/bars";
+import type { Range } from "../../src/picture/ranges";
+import { looksOf } from "../../src/store/looks";
+
+describe("a scalar bar", () => {
+  const look = looksOf([{ name: "cut", kind: "slice" }], [{ name: "p", association: "vertex", components: 1 }], {}).cut!;
+  let bars: ScalarBars;
+  let fixed: [readonly string[], Range][];
+  let text: BarText;
+  const root = (): HTMLElement => document.getElementById("bars")!;
+  const show = (range: Range): void => bars.show([{ key: "k", look, range, views: ["cut"] }]);
+  beforeEach(() => {
+    document.body.innerHTML = '<div id="bars"></div>';
+    fixed = [];
+    text = { title: "p", unit: null };
+    bars = new ScalarBars(root(), () => text, (views, range) => { fixed.push([views, range]); });
+  });
+
+  it("fixes the end that is typed, and the other as it is to the last bit", () => {
+    show([1 / 3, 2000 / 3]);
+    const high = root().querySelector<HTMLInputElement>('[aria-label="p: highest value"]')!;
+    expect(high.value).toBe("666.7");
+    high.value = "700";
+    high.dispatchEvent(new Event("change"));
+    expect(fixed).toEqual([[["cut"], [1 / 3, 700]]]);
+    high.value = "1,500";
+    high.dispatchEvent(new Event("change"));
+    expect([fixed.length, high.getAttribute("aria-invalid"), high.title]).toEqual([1, "true", "“1,500” can be read in two ways: write 1500 or 1.5"]);
+    show([0, 1]);
+    expect([high.value, high.getAttribute("aria-invalid")]).toEqual(["1", "false"]);
+  });
+
+  it("has the title and the unit that the run has told last", () => {
+    const said = (): (string | null)[] => [root().querySelector(".title")!.textContent, root().firstElementChild!.getAttribute("aria-label"), root().querySelector("input")!.getAttribute("aria-label")];
+    show([0, 1]);
+    expect(said()).toEqual(["p", "p", "p: highest value"]);
+    text = { title: "p magnitude", unit: "Pa" };
+    show([0, 1]);
+    expect(said()).toEqual(["p magnitudePa", "p magnitude", "p magnitude: highest value"]);
+  });
+});
