@@ -4,9 +4,11 @@
  */
 import "@kitware/vtk.js/Rendering/OpenGL/Actor";
 import "@kitware/vtk.js/Rendering/OpenGL/Camera";
-import "@kitware/vtk.js/Rendering/OpenGL/PolyDataMapper";
 import "@kitware/vtk.js/Rendering/OpenGL/Renderer";
 import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import { drawSurfacesFaster } from "./surface-node";
+
+drawSurfacesFaster();
 
 /** The part of vtk.js's tree of nodes that a pass needs; its types do not tell of it. */
 interface Node { traverse(pass: unknown): void; getContext(): WebGL2RenderingContext }
