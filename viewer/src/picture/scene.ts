@@ -231,7 +231,9 @@ export class Scene {
 
   viewBounds(name: string): [Vector, Vector] | null {
     const layer = this.layers.get(name);
-    return layer ? bounds(this.pending.get(name)?.points ?? layer.coordinates) : null;
+    if (!layer) return null;
+    const pending = this.pending.get(name);
+    return pending ? bounds(pending.points) : layer.bounds;
   }
 
   /** The feature under a place of the page; null when there is none. */
@@ -335,7 +337,7 @@ export class Scene {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (const layer of this.layers.values()) {
-      const found = layer.look.visible ? bounds(layer.coordinates) : null;
+      const found = layer.look.visible ? layer.bounds : null;
       if (!found) continue;
       for (let k = 0; k < 3; k++) {
         low[k] = Math.min(low[k]!, found[0][k]!);
