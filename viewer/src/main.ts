@@ -146,11 +146,11 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   },
   drawn: (axes) => {
     triad.turn(axes);
-    marks.draw();
     movie.drawn();
     following.drawn();
     if (pins.update()) history.update();
     worst.update();
+    marks.draw();
     slice.drawn();
     sliceHandle.drawn();
     handles.drawn();
@@ -160,6 +160,7 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
+  lost: (isLost) => showEmpty(...(isLost ? LOST : emptyText(store.state))),
 });
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
@@ -418,6 +419,7 @@ store.watch((state) => state.errors, (errors) => {
 
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
+const LOST: [string, string] = ["The picture is gone", "The browser has taken away what draws it, and may give it back. Reload the page if it does not."];
 /** What is said in place of the picture, as long as there is none. */
 function emptyText({ frames, connection: { state, explanation }, hello, end }: State): [string, string] {
   if (frames.count > 0) return ["", ""];

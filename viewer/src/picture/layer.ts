@@ -74,6 +74,8 @@ interface HighlightPieces { tint: Piece; outline: Piece }
 export class Layer {
   topology: TopologyFrame | null = null;
   frame: DataFrame | null = null;
+  /** The cycle of the newest values, whatever their topology. */
+  cycle = -Infinity;
   /** Coordinates that are drawn now, interleaved. */
   coordinates = new Float32Array(0);
   look: Look;
@@ -173,6 +175,7 @@ export class Layer {
       }
     }
     this.frame = frame;
+    this.cycle = frame.cycle;
     // Of a mesh that rests there is one list of coordinates: what was made of it stays as it is, here and in the memory of the graphics card.
     if (isSame(frame.points, this.coordinates)) frame.points = this.coordinates;
     else {
