@@ -27,6 +27,8 @@ const blending = {
     context.enable(context.BLEND);
     context.blendFuncSeparate(context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA, context.ONE, context.ONE_MINUS_SRC_ALPHA);
     renderer.traverse(blending);
+    // What hides all behind it is drawn without looking at that.
+    context.disable(context.BLEND);
   },
 };
 
@@ -39,8 +41,8 @@ export function drawnByProcessor(renderer: string): boolean {
 function canvasFor(antialias: boolean): { canvas: HTMLCanvasElement; context: WebGL2RenderingContext } {
   const canvas = document.createElement("canvas");
   canvas.style.width = "100%";
-  // The first to ask for the context says what it is like.
-  const context = canvas.getContext("webgl2", { antialias, depth: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
+  // The first to ask for the context says what it is like: the picture hides the page behind it.
+  const context = canvas.getContext("webgl2", { antialias, depth: true, alpha: false, preserveDrawingBuffer: false, powerPreference: "high-performance" });
   if (!context) throw new Error("WebGL 2 is missing");
   return { canvas, context };
 }
