@@ -263,7 +263,8 @@ new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
 store.watch((state) => state.frames.count > 0, () => dock.update());
 const barTitle = ({ look: { field, component } }: Bar): string => titleWithUnit(field, component);
 const ink = (): string => getComputedStyle(document.body).color;
-const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink()), {
+const ground = (): string => getComputedStyle(document.body).getPropertyValue("--over").trim();
+const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink(), ground()), {
   name: () => `tombolo-${store.state.frames.cycle ?? 0}`,
   told: (isRunning) => {
     part("movie").setAttribute("aria-pressed", String(isRunning));
@@ -287,7 +288,7 @@ watchPictureTools(part("scene"), part("stage"), {
   line: () => measureWith(line),
   note: () => notes.toggle(),
   movie: () => movie.toggle(),
-  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
+  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
