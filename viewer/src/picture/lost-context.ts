@@ -15,8 +15,8 @@ export function watchContext(canvas: HTMLCanvasElement, told: (isLost: boolean) 
   canvas.addEventListener("webglcontextrestored", () => told(false));
 }
 
-/** Lets go of all that was made in a context that is gone, so that the next picture makes it in the one that is there now. */
-export function renewResources(window: vtkOpenGLRenderWindow, renderers: readonly vtkRenderer[]): void {
+/** Lets go of all that was made in a context that is gone; what is drawn in the next one is made anew. Meanwhile nothing is complained of. */
+export function releaseResources(window: vtkOpenGLRenderWindow, renderers: readonly vtkRenderer[]): void {
   for (const renderer of renderers) {
     for (const actor of renderer.getActors()) {
       const mapper = (actor as vtkActor).getMapper();
@@ -25,6 +25,10 @@ export function renewResources(window: vtkOpenGLRenderWindow, renderers: readonl
     }
   }
   (window as unknown as { releaseGraphicsResources(): void }).releaseGraphicsResources();
+}
+
+/** Sets what vtk.js sets once, in a context that is another one. */
+export function prepareContext(window: vtkOpenGLRenderWindow): void {
   const context = (window as unknown as { getContext(): WebGL2RenderingContext }).getContext();
   context.blendFuncSeparate(context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA, context.ONE, context.ONE_MINUS_SRC_ALPHA);
   context.depthFunc(context.LEQUAL);

@@ -9,7 +9,7 @@ import { ChosenFaces } from "./chosen-faces";
 import { EarlyFrames } from "./early-frames";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
-import { renewResources, watchContext } from "./lost-context";
+import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
 import type { Box } from "./camera";
@@ -104,7 +104,8 @@ export class Scene {
 
   private lose(isLost: boolean): void {
     this.isLost = isLost;
-    if (!isLost) renewResources(this.canvas, this.window.getRenderers());
+    if (isLost) releaseResources(this.canvas, this.window.getRenderers());
+    else prepareContext(this.canvas);
     // An interaction draws by itself, also nothing.
     this.interactor.set({ enableRender: !isLost });
     this.events.lost(isLost);
