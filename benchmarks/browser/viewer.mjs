@@ -1,6 +1,6 @@
 /**
  * Measures the viewer in Debian's Chromium, watching the run at TOMBOLO_URL, and prints one line of JSON: seconds and bytes. The
- * picture is turned while frames come, the throat, where there is one, is dragged, and the heap is looked at before and after.
+ * picture is turned while frames come, by keys and by the mouse, the throat, where there is one, is dragged, and the heap is looked at before and after.
  *
  * CHROMIUM  the browser (default /usr/bin/chromium)
  *
@@ -51,25 +51,38 @@ try {
   await page.waitForTimeout(1000);
   const triangles = await page.evaluate(() => Object.values(window.tombolo.views).reduce((sum, view) => sum + view.triangles, 0));
 
-  const turn = (frames) => page.evaluate(async (count) => {
+  /** How long frames take, and how many cycles come in one: a viewer that shows no new values would be quick. */
+  const watch = (frames, isByKey) => page.evaluate(async ([count, isTurning]) => {
     const scene = document.getElementById("scene");
     const next = () => new Promise((resolve) => { requestAnimationFrame(resolve); });
     const times = [];
     let last = await next();
-    const cycle = window.tombolo.cycle;
+    const before = window.tombolo.frames;
     for (let i = 0; i < count; i++) {
-      scene.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
+      if (isTurning) scene.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
       const now = await next();
       times.push((now - last) / 1000);
       last = now;
     }
-    if (!(window.tombolo.cycle > cycle)) throw new Error("no frames came while the picture was turned");
-    return times;
-  }, frames);
-  await turn(20);
+    const came = window.tombolo.frames - before;
+    if (came === 0) throw new Error("no frames came while the picture was turned");
+    return { times, came: came / count };
+  }, [frames, isByKey]);
+  await watch(20, true);
   await page.evaluate(() => { window.longest = 0; });
-  const rotating = spread(await turn(FRAMES));
+  const byKeys = await watch(FRAMES, true);
   const longestTask = await page.evaluate(() => window.longest / 1000);
+
+  // Where nothing lies under the pointer, so that it turns the picture.
+  const scene = await page.locator("#scene").boundingBox();
+  const [left, top] = [scene.x + 0.1 * scene.width, scene.y + 0.1 * scene.height];
+  await page.mouse.move(left, top);
+  await page.mouse.down();
+  let isWatched = true;
+  const watched = watch(FRAMES, false).finally(() => { isWatched = false; });
+  for (let step = 0; isWatched; step++) await page.mouse.move(left + 3 * (step % 100), top + (step % 50));
+  const byMouse = await watched;
+  await page.mouse.up();
 
   let firstPreview = null, dragging = null;
   await page.click('[data-camera="0"]');
@@ -109,7 +122,8 @@ try {
   const heapGrowth = (await heap()) - before;
 
   console.log(JSON.stringify({
-    triangles, first_picture: firstPicture / 1000, wire, rotating, longest_task: longestTask, first_preview: firstPreview, dragging, heap_growth: heapGrowth,
+    triangles, first_picture: firstPicture / 1000, wire, rotating: spread(byKeys.times), frames_with_values: byKeys.came,
+    rotating_by_mouse: spread(byMouse.times), longest_task: longestTask, first_preview: firstPreview, dragging, heap_growth: heapGrowth,
   }));
 } finally {
   await browser.close();

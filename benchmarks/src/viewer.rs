@@ -23,6 +23,8 @@ struct Seen {
     first_picture: f64,
     wire: f64,
     rotating: Spread,
+    frames_with_values: f64,
+    rotating_by_mouse: Spread,
     longest_task: f64,
     first_preview: Option<f64>,
     dragging: Option<Spread>,
@@ -56,6 +58,9 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         rows.push(Row::new(name("page to first picture"), seen.first_picture));
         rows.push(Row::new(name("frame, rotating while streaming"), seen.rotating.median));
         rows.push(Row::new(name("the same, 95th percentile"), seen.rotating.late));
+        rows.push(Row::new(name("streamed frames in one of these"), seen.frames_with_values));
+        rows.push(Row::new(name("frame, rotating by mouse"), seen.rotating_by_mouse.median));
+        rows.push(Row::new(name("the same, 95th percentile"), seen.rotating_by_mouse.late));
         rows.push(Row::new(name("longest task while streaming"), seen.longest_task));
         if let Some(first) = seen.first_preview {
             rows.push(Row::new(name("first preview"), first));

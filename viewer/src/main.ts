@@ -150,11 +150,11 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   },
   drawn: (axes) => {
     triad.turn(axes);
-    marks.draw();
     movie.drawn();
     following.drawn();
     if (pins.update()) history.update();
     worst.update();
+    marks.draw();
     slice.drawn();
     sliceHandle.drawn();
     handles.drawn();
@@ -164,6 +164,7 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
+  lost: (isLost) => showEmpty(...(isLost ? LOST : emptyText(store.state))),
 });
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
@@ -266,7 +267,8 @@ new Theming(part("theme") as HTMLButtonElement, kept, (theme) => {
 store.watch((state) => state.frames.count > 0, () => dock.update());
 const barTitle = ({ look: { field, component } }: Bar): string => titleWithUnit(field, component);
 const ink = (): string => getComputedStyle(document.body).color;
-const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink()), {
+const ground = (): string => getComputedStyle(document.body).getPropertyValue("--over").trim();
+const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink(), ground()), {
   name: () => `tombolo-${store.state.frames.cycle ?? 0}`,
   told: (isRunning) => {
     part("movie").setAttribute("aria-pressed", String(isRunning));
@@ -290,7 +292,7 @@ watchPictureTools(part("scene"), part("stage"), {
   line: () => measureWith(line),
   note: () => notes.toggle(),
   movie: () => movie.toggle(),
-  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
+  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
@@ -424,6 +426,7 @@ store.watch((state) => state.errors, (errors) => {
 
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
+const LOST: [string, string] = ["The picture is gone", "The browser has taken away what draws it, and may give it back. Reload the page if it does not."];
 /** What is said in place of the picture, as long as there is none. */
 function emptyText({ frames, connection: { state, explanation }, hello, end }: State): [string, string] {
   if (frames.count > 0) return ["", ""];

@@ -9,6 +9,7 @@ import type { ShownPoints } from "../preview/previewer";
 import type { Action } from "../store/actions";
 import { bodyOf, chosen, kindOf } from "../store/draft";
 import type { State } from "../store/state";
+import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { boxRegionOf, combined, grown, meantBy, neighboursOf, pointsOf, regionOf } from "./face-choice";
 import type { Mode } from "./face-choice";
@@ -42,6 +43,7 @@ export class FaceTools implements ShapeRegion {
   private surface: ShownPoints | null = null;
   private neighbours: Int32Array | null = null;
   private meant: { region: Json; faces: ReadonlySet<number>; points: ReadonlySet<number> } | null = null;
+  private box: { points: Float32Array; meant: object; names: readonly string[]; bounds: [Vector, Vector] | null } | null = null;
   private readonly bar = element("div", { class: "face-tools", role: "toolbar", "aria-label": "Choosing faces", hidden: true });
   private readonly buttons: Record<Tool, HTMLButtonElement>;
   private readonly mode = element("select", { "aria-label": "what a stroke does" },
@@ -296,10 +298,18 @@ export class FaceTools implements ShapeRegion {
     const { surface, meant } = this;
     if (!surface || !meant) return null;
     const names = chosen(this.store.state, "handle");
-    if (names.length === 0) return boxOf(surface.points, meant.points);
+    const { box } = this;
+    if (box?.points === surface.points && box.meant === meant && sameJson(box.names, names)) return box.bounds;
+    this.box = { points: surface.points, meant, names, bounds: boxOf(surface.points, this.pointsIn(surface, meant.points, names)) };
+    return this.box.bounds;
+  }
+
+  /** Those of some points that belong to some features; all where none is named. */
+  private pointsIn(surface: ShownPoints, points: Iterable<number>, names: readonly string[]): Iterable<number> {
+    if (names.length === 0) return points;
     const wanted = new Set(names.map((name) => surface.features.indexOf(name)));
     const own = pointsOf(surface.triangles, [...surface.triangleFeatures.keys()].filter((face) => wanted.has(surface.triangleFeatures[face]!)));
-    return boxOf(surface.points, [...meant.points].filter((point) => own.has(point)));
+    return [...points].filter((point) => own.has(point));
   }
 
   /** The point of the chosen faces that is seen at a place; null where another face is, or none. */

@@ -95,9 +95,8 @@ export class Handles {
   drawn(): void {
     this.grippable.drawn();
     this.bending.show();
-    const target = this.target();
-    const center = target?.center() ?? null;
-    this.shapes = target && center ? gizmoShapes(this.picture.projection(), center, target.kinds) : [];
+    const grip = this.grip();
+    this.shapes = grip ? gizmoShapes(this.picture.projection(), grip.center, grip.target.kinds) : [];
     this.overlay.show(this.shapes, this.gesture && this.gesture.lock.kind !== "free" ? this.gesture.lock : this.hovered);
   }
 
@@ -124,9 +123,15 @@ export class Handles {
   }
 
   private target(): Target | null {
+    return this.grip()?.target ?? null;
+  }
+
+  /** What can be gripped, and where its gizmo is. */
+  private grip(): { target: Target; center: Vector } | null {
     // While the skeleton is shown the gizmo is its own.
     const target = this.picture.shownBones ? this.grippable : this.shape;
-    return target.center() ? target : null;
+    const center = target.center();
+    return center && { target, center };
   }
 
   /** Whether nothing of the gizmo lies at a place of the page. */

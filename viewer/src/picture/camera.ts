@@ -15,10 +15,10 @@ export class Camera {
   /** Whether it was put anywhere yet. */
   isPlaced = false;
 
-  /** `box` is around what is seen; `changed` is called when it stands elsewhere. */
+  /** `box` is around what is seen; `changed` is called when it stands elsewhere, and `moved` when it follows another one. */
   constructor(
     private readonly renderer: vtkRenderer, private readonly canvas: vtkOpenGLRenderWindow,
-    private readonly box: () => Box | null, private readonly request: () => void,
+    private readonly box: () => Box | null, private readonly request: () => void, private readonly moved: () => void,
   ) {}
 
   private place(): string {
@@ -38,7 +38,9 @@ export class Camera {
     };
   }
 
-  set stand({ position, focalPoint, viewUp, parallel, parallelScale, viewAngle }: Stand) {
+  set stand(stand: Stand) {
+    const { position, focalPoint, viewUp, parallel, parallelScale, viewAngle } = stand;
+    if (this.isPlaced && JSON.stringify(stand) !== JSON.stringify(this.stand)) this.moved();
     this.isPlaced = true;
     this.whole = null;
     const camera = this.renderer.getActiveCamera();

@@ -4,9 +4,11 @@
  */
 import "@kitware/vtk.js/Rendering/OpenGL/Actor";
 import "@kitware/vtk.js/Rendering/OpenGL/Camera";
-import "@kitware/vtk.js/Rendering/OpenGL/PolyDataMapper";
 import "@kitware/vtk.js/Rendering/OpenGL/Renderer";
 import vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
+import { drawSurfacesFaster } from "./surface-node";
+
+drawSurfacesFaster();
 
 /** The part of vtk.js's tree of nodes that a pass needs; its types do not tell of it. */
 interface Node { traverse(pass: unknown): void; getContext(): WebGL2RenderingContext }
@@ -25,6 +27,8 @@ const blending = {
     context.enable(context.BLEND);
     context.blendFuncSeparate(context.SRC_ALPHA, context.ONE_MINUS_SRC_ALPHA, context.ONE, context.ONE_MINUS_SRC_ALPHA);
     renderer.traverse(blending);
+    // What hides all behind it is drawn without looking at that.
+    context.disable(context.BLEND);
   },
 };
 
@@ -37,8 +41,8 @@ export function drawnByProcessor(renderer: string): boolean {
 function canvasFor(antialias: boolean): { canvas: HTMLCanvasElement; context: WebGL2RenderingContext } {
   const canvas = document.createElement("canvas");
   canvas.style.width = "100%";
-  // The first to ask for the context says what it is like.
-  const context = canvas.getContext("webgl2", { antialias, depth: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
+  // The first to ask for the context says what it is like: the picture hides the page behind it.
+  const context = canvas.getContext("webgl2", { antialias, depth: true, alpha: false, preserveDrawingBuffer: false, powerPreference: "high-performance" });
   if (!context) throw new Error("WebGL 2 is missing");
   return { canvas, context };
 }

@@ -36,6 +36,18 @@ export function scalars(field: DataArray, component: number): Float32Array {
   return result;
 }
 
+/**
+ * Where values lie between the ends of a range: 0 at the low end, 1 at the high one, NaN where there is no number. With logarithms nothing
+ * lies below the low end: between a zero and its neighbour a colour would otherwise hardly be seen.
+ */
+export function mapped(values: Float32Array, [low, high]: readonly [number, number], logarithmic: boolean, into: Float32Array = new Float32Array(values.length)): Float32Array {
+  const origin = logarithmic ? Math.log10(low) : low;
+  const part = 1 / ((logarithmic ? Math.log10(high) : high) - origin);
+  if (!logarithmic) for (let i = 0; i < values.length; i++) into[i] = (values[i]! - origin) * part;
+  else for (let i = 0; i < values.length; i++) into[i] = Number.isNaN(values[i]) ? NaN : (Math.log10(Math.max(values[i]!, low)) - origin) * part;
+  return into;
+}
+
 /** Smallest and largest finite value; null when there is none. */
 export function extremes(values: Float32Array): [number, number] | null {
   let low = Infinity;

@@ -46,6 +46,7 @@ export class Compare {
       bars: () => undefined,
       drawn: () => this.linkFrom(),
       trouble: (message) => this.source.trouble(message),
+      lost: () => undefined,
     });
     this.scene.setTheme(this.theme);
     this.update();

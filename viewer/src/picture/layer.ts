@@ -4,12 +4,10 @@ import vtkMapper from "@kitware/vtk.js/Rendering/Core/Mapper";
 import vtkPolyData from "@kitware/vtk.js/Common/DataModel/PolyData";
 import vtkPoints from "@kitware/vtk.js/Common/Core/Points";
 import vtkCellArray from "@kitware/vtk.js/Common/Core/CellArray";
-import vtkDataArray from "@kitware/vtk.js/Common/Core/DataArray";
-import vtkColorTransferFunction from "@kitware/vtk.js/Rendering/Core/ColorTransferFunction";
 import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type { Colour } from "./colour";
-import { colourMap, extremes, scalars } from "./colour";
-import { featureEdges } from "./picking";
+import { Colouring } from "./colouring";
+import { bounds, featureEdges } from "./picking";
 import type { Look } from "../store/looks";
 import type { Range } from "./ranges";
 import type { DataArray, DataFrame, TopologyFrame, Vector } from "../connection/protocol";
@@ -35,11 +33,11 @@ function cells(points: Uint32Array, size: number): Uint32Array {
   return result;
 }
 
-function linesFirst(values: Float32Array, triangles: number): Float32Array {
-  const result = new Float32Array(values.length);
-  result.set(values.subarray(triangles));
-  result.set(values.subarray(0, triangles), values.length - triangles);
-  return result;
+/** Whether two lists hold the same numbers. */
+function isSame(a: Float32Array, b: Float32Array): boolean {
+  if (a.length !== b.length) return false;
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
 }
 
 export class Piece {
@@ -76,11 +74,13 @@ interface HighlightPieces { tint: Piece; outline: Piece }
 export class Layer {
   topology: TopologyFrame | null = null;
   frame: DataFrame | null = null;
+  /** The cycle of the newest values, whatever their topology. */
+  cycle = -Infinity;
   /** Coordinates that are drawn now, interleaved. */
   coordinates = new Float32Array(0);
   look: Look;
-  private colouredBy: DataArray | null = null;
-  private readonly colours = vtkColorTransferFunction.newInstance();
+  private readonly colouring: Colouring;
+  private box: { of: Float32Array; bounds: [Vector, Vector] | null } | null = null;
   /** Over the triangles of the topology; made when it is first asked, and brought up to the coordinates that are drawn. */
   private tree: TriangleTree | null = null;
   private treeOf: Float32Array | null = null;
@@ -93,12 +93,8 @@ export class Layer {
   constructor(readonly name: string, readonly kind: string, look: Look, private readonly renderer: vtkRenderer) {
     this.look = look;
     this.surface = new Piece(this.points, renderer);
-    const { mapper, actor } = this.surface;
-    mapper.setLookupTable(this.colours);
-    mapper.setUseLookupTableScalarRange(true);
-    mapper.setInterpolateScalarsBeforeMapping(true);
-    mapper.setScalarVisibility(false);
-    const property = actor.getProperty();
+    this.colouring = new Colouring(this.surface.data, this.surface.mapper);
+    const property = this.surface.actor.getProperty();
     property.setColor(...SOLID);
     property.setInterpolationToFlat();
     if (kind === "surface") {
@@ -148,7 +144,7 @@ export class Layer {
     this.topology = topology;
     this.tree = null;
     this.frame = null;
-    this.colouredBy = null;
+    this.colouring.take(null, -1, 0);
     for (const key of Object.keys(this.highlighted) as Highlight[]) this.highlighted[key] = "";
   }
 
@@ -179,11 +175,15 @@ export class Layer {
       }
     }
     this.frame = frame;
-    this.coordinates = frame.points as Float32Array<ArrayBuffer>;
-    this.points.setData(frame.points, 3);
-    this.points.modified();
+    this.cycle = frame.cycle;
+    // Of a mesh that rests there is one list of coordinates: what was made of it stays as it is, here and in the memory of the graphics card.
+    if (isSame(frame.points, this.coordinates)) frame.points = this.coordinates;
+    else {
+      this.coordinates = frame.points as Float32Array<ArrayBuffer>;
+      this.points.setData(frame.points, 3);
+      this.points.modified();
+    }
     if (fresh) this.setCells(topology);
-    for (const piece of this.pieces()) piece.data.modified();
     return null;
   }
 
@@ -194,43 +194,27 @@ export class Layer {
       ? featureEdges(topology.triangles, topology.triangleFeatures, topology.points) : new Uint32Array(0));
   }
 
+  /** The box around what is drawn. */
+  get bounds(): [Vector, Vector] | null {
+    if (this.box?.of !== this.coordinates) this.box = { of: this.coordinates, bounds: bounds(this.coordinates) };
+    return this.box.bounds;
+  }
+
   /** Takes the scalars of the field that colours; returns their range, null when this view does not carry the field. */
   takeScalars(): Range | null {
-    const { field: name, component, range: { logarithmic } } = this.look;
-    const field = this.frame?.fields.find((candidate) => candidate.name === name);
-    const { data, mapper } = this.surface;
-    this.colouredBy = field ?? null;
-    mapper.setScalarVisibility(field !== undefined);
-    if (!field) return null;
-    const vertex = field.association === "vertex";
-    let values = scalars(field, component);
-    const found = extremes(values);
-    // vtk.js numbers the lines of a view before its triangles.
-    const triangles = vertex ? 0 : this.topology!.triangles.length / 3;
-    if (triangles > 0 && triangles < values.length) values = linesFirst(values, triangles);
-    if (logarithmic) values = values.map((value) => (value > 0 ? Math.log10(value) : -38));
-    const array = vtkDataArray.newInstance({ name: field.name, numberOfComponents: 1, values });
-    data.getPointData().setScalars(vertex ? array : (null as never));
-    data.getCellData().setScalars(vertex ? (null as never) : array);
-    if (vertex) mapper.setScalarModeToUsePointData();
-    else mapper.setScalarModeToUseCellData();
-    data.modified();
-    return found;
+    const { field: name, component } = this.look;
+    const field = this.frame?.fields.find((candidate) => candidate.name === name) ?? null;
+    return this.colouring.take(field, component, (this.topology?.triangles.length ?? 0) / 3);
   }
 
   /** Lets the colours of its map stand for a range. */
-  paint([low, high]: Range): void {
-    const [from, to] = this.look.range.logarithmic ? [Math.log10(low), Math.log10(high)] : [low, high];
-    const { stops } = colourMap(this.look.map);
-    this.colours.removeAllPoints();
-    stops.forEach((stop, i) => this.colours.addRGBPoint(from + ((to - from) * i) / (stops.length - 1), ...stop));
-    this.colours.setMappingRange(from, to);
-    this.colours.updateRange();
+  paint(range: Range): void {
+    this.colouring.paint(range, this.look);
   }
 
   /** The field that colours it now. */
   get coloured(): DataArray | null {
-    return this.colouredBy;
+    return this.colouring.field;
   }
 
   highlight(kind: Highlight, names: readonly string[], features: readonly string[]): void {
@@ -240,9 +224,9 @@ export class Layer {
     this.highlighted[kind] = key;
     const wanted = new Set(names.map((name) => features.indexOf(name)));
     const picked: number[] = [];
-    topology.triangleFeatures.forEach((feature, triangle) => {
-      if (wanted.has(feature)) picked.push(topology.triangles[3 * triangle]!, topology.triangles[3 * triangle + 1]!, topology.triangles[3 * triangle + 2]!);
-    });
+    for (let triangle = 0; triangle < topology.triangleFeatures.length; triangle++) {
+      if (wanted.has(topology.triangleFeatures[triangle]!)) picked.push(topology.triangles[3 * triangle]!, topology.triangles[3 * triangle + 1]!, topology.triangles[3 * triangle + 2]!);
+    }
     const triangles = Uint32Array.from(picked);
     const { tint, outline } = this.highlightOf(kind);
     tint.setTriangles(triangles);

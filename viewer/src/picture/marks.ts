@@ -1,5 +1,6 @@
 /** Marks over the picture that go with places of it: pinned probes, the ruler, the worst cells, notes. */
 import type { Vector } from "../connection/protocol";
+import { sameJson } from "../store/store";
 
 /** A mark: a point, or a line through several, and what is written beside the last. */
 export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" | "note" }
@@ -13,8 +14,9 @@ export class Marks {
   /** `place` says where on the page a point of the picture is drawn. */
   constructor(private readonly root: SVGElement, private readonly place: (point: Vector) => [number, number]) {}
 
-  /** Replaces the marks of one origin. */
+  /** Replaces the marks of one origin. Most are told again with each picture. */
   set(origin: string, marks: readonly Mark[]): void {
+    if (sameJson(this.groups.get(origin) ?? [], marks)) return;
     if (marks.length === 0) this.groups.delete(origin);
     else this.groups.set(origin, marks);
     this.draw();

@@ -40,9 +40,10 @@ export class Movie {
   private start(): void {
     const picture = this.picture();
     const format = typeof MediaRecorder === "undefined" ? undefined : FORMATS.find((candidate) => MediaRecorder.isTypeSupported(candidate));
-    // A film has one size from its beginning to its end, of even numbers.
+    // A film has one size from its beginning to its end, of even numbers: that of the picture at rest, also where it is moved now.
     const even = (size: number): number => Math.max(2, 2 * Math.floor(size / 2));
-    const canvas = picture && element("canvas", { width: even(picture.width), height: even(picture.height) });
+    const pixels = window.devicePixelRatio || 1;
+    const canvas = picture && element("canvas", { width: even(picture.clientWidth * pixels), height: even(picture.clientHeight * pixels) });
     this.context = canvas?.getContext("2d") ?? null;
     if (!canvas || !this.context || format === undefined) return this.listener.trouble("this browser cannot make films");
     const recorder = new MediaRecorder(canvas.captureStream(RATE), { mimeType: format, videoBitsPerSecond: BITS });

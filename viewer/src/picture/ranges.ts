@@ -11,28 +11,47 @@ const DECADES = 6;
 
 const union = (a: Range | null, b: Range | null): Range | null => (a && b ? [Math.min(a[0], b[0]), Math.max(a[1], b[1])] : a ?? b);
 
-/** Remembers what was shown, by a key that names what is coloured, so that colours can stay the same from frame to frame. */
+/** A view that is coloured: a key that names it and what of its field, the range of its values now, and whether it is seen. */
+export interface Coloured { key: string; now: Range | null; isSeen: boolean }
+
+/** Remembers what was, for each view and field, so that colours can stay the same from frame to frame. */
 export class Ranges {
+  /** Automatic ranges, as they were shown last. */
   private readonly shown = new Map<string, Range>();
+  private readonly ever = new Map<string, Range>();
 
   /**
-   * The range to show, of the range of the values that are there; null for none. While `held`, an automatic range stays as it was:
-   * the picture of a shape that is under way can then be compared with the one before.
+   * The range to show for views that have their colours in common; null for none. While `held`, an automatic range stays as it was: the
+   * picture of a shape that is under way can then be compared with the one before. What was over time counts also where it is not seen now.
    */
-  range(key: string, choice: RangeChoice, now: Range | null, held: boolean): Range | null {
-    let found: Range | null;
-    if (choice.kind === "fixed") found = choice.low < choice.high ? [choice.low, choice.high] : now;
-    else {
-      const before = this.shown.get(key) ?? null;
-      found = choice.kind === "over time" ? union(before, now) : held && before ? before : now;
-      if (found) this.shown.set(key, found);
+  range(views: readonly Coloured[], choice: RangeChoice, held: boolean): Range | null {
+    const seen = views.filter(({ isSeen }) => isSeen);
+    const now = seen.reduce<Range | null>((all, view) => union(all, view.now), null);
+    const remembered = (ranges: ReadonlyMap<string, Range>, of: readonly Coloured[]): Range | null => of.reduce<Range | null>((all, { key }) => union(all, ranges.get(key) ?? null), null);
+    if (choice.kind === "fixed") return choice.low < choice.high ? spread([choice.low, choice.high], choice) : now && spread(now, choice);
+    if (choice.kind === "over time") {
+      for (const view of views) {
+        const all = union(this.ever.get(view.key) ?? null, view.now);
+        if (all) this.ever.set(view.key, all);
+      }
+      const found = remembered(this.ever, views);
+      return found && spread(found, choice);
     }
-    return found && spread(found, choice);
+    const found = (held ? remembered(this.shown, seen) : null) ?? now;
+    if (!found) return null;
+    for (const { key } of seen) this.shown.set(key, found);
+    return spread(found, choice);
   }
 
   /** Forgets what was shown under keys that are no longer there. */
   keep(keys: ReadonlySet<string>): void {
-    for (const key of this.shown.keys()) if (!keys.has(key)) this.shown.delete(key);
+    for (const known of [this.shown, this.ever]) for (const key of known.keys()) if (!keys.has(key)) known.delete(key);
+  }
+
+  /** Forgets everything: time begins anew. */
+  clear(): void {
+    this.shown.clear();
+    this.ever.clear();
   }
 }
 

@@ -9,6 +9,7 @@ import { ChosenFaces } from "./chosen-faces";
 import { EarlyFrames } from "./early-frames";
 import { Ghost } from "./ghost";
 import { Layer } from "./layer";
+import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
 import type { Box } from "./camera";
@@ -17,10 +18,11 @@ import { Pace } from "./pace";
 import { cornersOf, probeNear, readProbe, weights } from "./probe";
 import type { Probe, ProbeReading } from "./probe";
 import { Ranges } from "./ranges";
-import type { Range } from "./ranges";
+import { Rhythm } from "./rhythm";
+import { colour } from "./shared-colours";
+import type { Bar } from "./shared-colours";
 import { own } from "../own";
-import { colourKey } from "../store/looks";
-import type { Look, Looks } from "../store/looks";
+import type { Looks } from "../store/looks";
 import { THEMES } from "./theme";
 import type { Theme } from "./theme";
 import { Projection } from "../handles/projection";
@@ -29,11 +31,7 @@ import type { DataFrame, TopologyFrame, Vector, ViewInformation } from "../conne
 import type { Selection } from "../store/selection";
 import type { Bones } from "./skeleton";
 
-/** The longest pause between two pictures of new values, in milliseconds. */
-const LONGEST_REST = 500;
-
-/** The colours that some views have in common, and the range that they stand for. */
-export interface Bar { key: string; look: Look; views: string[]; range: Range }
+export type { Bar } from "./shared-colours";
 
 export interface SceneEvents {
   /** What the colours stand for that are drawn now. */
@@ -41,6 +39,8 @@ export interface SceneEvents {
   /** After each picture, with the directions of the axes on the screen. */
   drawn(axes: [number, number][]): void;
   trouble(message: string): void;
+  /** Whether the browser has taken away what draws. */
+  lost(isLost: boolean): void;
 }
 
 /** What was drawn: the newest cycle in it, and a number made of all its pixels. */
@@ -66,18 +66,19 @@ export class Scene {
   /** Whether nothing was ever drawn. */
   private isEmpty = true;
   private theme: Theme = "dark";
-  private scheduled = false;
-  /** Who waits for the next picture. */
-  private readonly drawn: (() => void)[] = [];
-  /** The time before which new values do not ask for a picture. */
-  private rested = 0;
-  private waiting: number | null = null;
+  private readonly rhythm = new Rhythm({ isAnimating: () => this.interactor.isAnimating(), draw: () => this.draw() });
+  private isPlacing = false;
+  private isLost = false;
+  /** Whether what is drawn next was brought up to what has come. */
+  private isPrepared = false;
   private recolour = true;
 
   constructor(private readonly container: HTMLElement, { window, byProcessor }: Canvas, private readonly selection: Selection, private readonly events: SceneEvents) {
     this.canvas = window;
     this.pace = new Pace(byProcessor, () => this.fit());
-    this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => this.request());
+    this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => {
+      if (!this.isPlacing) this.request();
+    }, () => this.pace.move());
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
     this.canvas.setContainer(container);
@@ -86,7 +87,10 @@ export class Scene {
     this.pace.follow(container);
     this.interactor.bindEvents(container);
     this.interactor.setInteractorStyle(mouse());
-    this.interactor.onRenderEvent(() => this.turned());
+    // While an interaction draws pictures by itself, they hold what has come like any other.
+    this.interactor.onAnimation(() => this.prepare());
+    this.interactor.onEndAnimation(() => this.prepare());
+    this.interactor.onRenderEvent(() => this.drawn());
     container.addEventListener("keypress", (event) => event.stopImmediatePropagation(), true);
     container.addEventListener("keydown", (event) => {
       if (this.camera.key(event)) this.pace.move();
@@ -94,7 +98,18 @@ export class Scene {
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
     this.ghost = new Ghost(this.renderer);
+    watchContext(this.canvas.getCanvas()!, (isLost) => this.lose(isLost));
     this.resize();
+  }
+
+  private lose(isLost: boolean): void {
+    this.isLost = isLost;
+    if (isLost) releaseResources(this.canvas, this.window.getRenderers());
+    else prepareContext(this.canvas);
+    // An interaction draws by itself, also nothing.
+    this.interactor.set({ enableRender: !isLost });
+    this.events.lost(isLost);
+    this.request();
   }
 
   /** A renderer over the other one: what lies in the middle of a shape would be hidden by it. */
@@ -204,7 +219,7 @@ export class Scene {
     if (!layer) this.early.keep(frame);
     if (!layer?.topology || layer.topology.topology !== frame.topology) return false;
     this.pending.set(frame.view, frame);
-    this.requestGently();
+    this.rhythm.requestGently();
     return true;
   }
 
@@ -231,7 +246,9 @@ export class Scene {
 
   viewBounds(name: string): [Vector, Vector] | null {
     const layer = this.layers.get(name);
-    return layer ? bounds(this.pending.get(name)?.points ?? layer.coordinates) : null;
+    if (!layer) return null;
+    const pending = this.pending.get(name);
+    return pending ? bounds(pending.points) : layer.bounds;
   }
 
   /** The feature under a place of the page; null when there is none. */
@@ -335,7 +352,7 @@ export class Scene {
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
     for (const layer of this.layers.values()) {
-      const found = layer.look.visible ? bounds(layer.coordinates) : null;
+      const found = layer.look.visible ? layer.bounds : null;
       if (!found) continue;
       for (let k = 0; k < 3; k++) {
         low[k] = Math.min(low[k]!, found[0][k]!);
@@ -365,26 +382,13 @@ export class Scene {
   }
 
   private request(drawn?: () => void): void {
-    if (drawn) this.drawn.push(drawn);
-    if (this.scheduled) return;
-    this.scheduled = true;
-    requestAnimationFrame(() => {
-      this.scheduled = false;
-      const start = performance.now();
-      this.draw();
-      for (const told of this.drawn.splice(0)) told();
-      // What a picture costs is known once the browser takes up its next task.
-      setTimeout(() => {
-        this.rested = performance.now();
-        this.rested += Math.min(LONGEST_REST, this.rested - start);
-      }, 0);
-    });
+    this.rhythm.request(drawn);
   }
 
   /** Draws all that has come, and says what was drawn. */
   picture(): Promise<Picture> {
     this.pace.rest();
-    return new Promise((resolve) => this.request(() => {
+    return new Promise((resolve) => this.rhythm.requestAll(() => {
       const cycles = [...this.layers.values()].flatMap((layer) => (layer.frame ? [layer.frame.cycle] : []));
       resolve({ cycle: cycles.length > 0 ? Math.max(...cycles) : null, pixels: this.pixels() });
     }));
@@ -398,7 +402,7 @@ export class Scene {
   /** Draws all that has come; the canvas holds the picture until the task ends in which `taken` is called. */
   withPicture(taken: (canvas: HTMLCanvasElement) => void): void {
     this.pace.rest();
-    this.request(() => {
+    this.rhythm.requestAll(() => {
       const canvas = this.canvas.getCanvas();
       if (canvas) taken(canvas);
     });
@@ -415,24 +419,24 @@ export class Scene {
     return hash >>> 0;
   }
 
-  /** Draws new values, but leaves as much time between pictures as they take: messages and the person come first. */
-  private requestGently(): void {
-    const rest = this.rested - performance.now();
-    if (rest <= 0) this.request();
-    else this.waiting ??= window.setTimeout(() => {
-      this.waiting = null;
-      this.request();
-    }, rest);
+  private draw(): void {
+    this.prepare();
+    // Until the first values are there the page says what is waited for: no time is spent on a picture of nothing.
+    if (this.isEmpty || this.isLost) this.drawn();
+    else this.window.render();
   }
 
-  private draw(): void {
-    for (const [name, frame] of this.pending) {
-      const trouble = this.layers.get(name)?.setData(frame) ?? null;
-      if (trouble) this.events.trouble(trouble);
-      else this.recolour = true;
+  /** Brings what is about to be drawn up to what has come. */
+  private prepare(): void {
+    if (this.pending.size > 0) {
+      // A view with another topology is not seen until its values are there.
+      const isMissing = [...this.pending.keys()].some((name) => this.layers.get(name)?.frame === null);
+      if (this.rhythm.takesValues(isMissing)) this.take();
     }
-    this.pending.clear();
-    if (this.recolour) this.applyColours();
+    if (this.recolour) {
+      this.recolour = false;
+      this.events.bars(colour(this.layers.values(), this.ranges, this.held));
+    }
     for (const layer of this.layers.values()) {
       const names = this.features;
       layer.highlight("handle", this.selection.chosen("handle", names), names);
@@ -440,42 +444,40 @@ export class Scene {
       layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
       layer.show();
     }
-    // Until the first values are there the page says what is waited for: no time is spent on a picture of nothing.
     this.isEmpty &&= [...this.layers.values()].every((layer) => layer.frame === null);
-    if (this.isEmpty) return this.turned();
-    if (!this.camera.isPlaced && this.box()) this.camera.reset();
-    this.renderer.resetCameraClippingRange();
-    this.window.render();
-    this.turned();
+    if (!this.isEmpty) {
+      if (!this.camera.isPlaced && this.box()) this.place();
+      this.renderer.resetCameraClippingRange();
+    }
+    this.isPrepared = true;
   }
 
-  private applyColours(): void {
-    this.recolour = false;
-    const groups = new Map<string, { look: Look; now: Range | null; layers: Layer[] }>();
-    for (const layer of this.layers.values()) {
-      const now = layer.takeScalars();
-      const key = colourKey(layer.look);
-      if (key === null || !now || !layer.look.visible) continue;
-      const group = groups.get(key);
-      if (!group) groups.set(key, { look: layer.look, now, layers: [layer] });
-      else {
-        group.now = group.now ? [Math.min(group.now[0], now[0]), Math.max(group.now[1], now[1])] : now;
-        group.layers.push(layer);
-      }
-    }
-    const bars: Bar[] = [];
-    for (const [key, { look, now, layers }] of groups) {
-      const range = this.ranges.range(key, look.range, now, this.held);
-      if (!range) continue;
-      for (const layer of layers) layer.paint(range);
-      bars.push({ key, look, range, views: layers.map((layer) => layer.name) });
-    }
-    this.ranges.keep(new Set(groups.keys()));
-    this.events.bars(bars);
+  /** Places the camera for the picture that is being made up: no other is asked for. */
+  private place(): void {
+    this.isPlacing = true;
+    this.camera.reset();
+    this.isPlacing = false;
   }
 
-  private turned(): void {
+  /** Takes the values that have come. */
+  private take(): void {
+    for (const [name, frame] of this.pending) {
+      const layer = this.layers.get(name);
+      // In a recording one may go back, and another run begins anew: what comes then is not more of what was.
+      if (layer && frame.cycle < layer.cycle) this.ranges.clear();
+      const trouble = layer?.setData(frame) ?? null;
+      if (trouble) this.events.trouble(trouble);
+      else this.recolour = true;
+    }
+    this.pending.clear();
+  }
+
+  /** The picture was drawn: what lies over it follows, and who waits for it is told. */
+  private drawn(): void {
     const matrix = this.renderer.getActiveCamera().getViewMatrix();
     this.events.drawn([0, 1, 2].map((axis) => [matrix[axis] ?? 0, matrix[4 + axis] ?? 0]));
+    if (!this.isPrepared) return;
+    this.isPrepared = false;
+    this.rhythm.drawn();
   }
 }

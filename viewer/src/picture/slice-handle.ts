@@ -52,7 +52,7 @@ export class SliceHandle {
   /** Draws it where the picture is now seen from. */
   drawn(): void {
     const plane = this.drag ? atOffset(this.drag.plane, this.drag.offset) : this.slice.movable;
-    const box = this.picture.bounds();
+    const box = plane && this.picture.bounds();
     const cut = plane && box ? outlineOf(box, plane) : [];
     const projection = cut.length > 2 ? this.picture.projection() : null;
     const corners = projection ? cut.map((point) => projection.toPicture(point)) : [];

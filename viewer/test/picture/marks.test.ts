@@ -1,5 +1,5 @@
 // @vitest-environment jsdom
-import { beforeEach, describe, expect, it } from "vitest";
+import { beforeEach, describe, expect, it, vi } from "vitest";
 import { History, seriesKey } from "../../src/history/series";
 import { Marks } from "../../src/picture/marks";
 import { Pins } from "../../src/picture/pins";
@@ -28,6 +28,21 @@ describe("marks over the picture", () => {
     ruler.toggle();
     expect(root.childNodes.length).toBe(0);
     expect(measure([[1, 1, 1]])).toBe("");
+  });
+
+  it("are made once for each picture, though their owners tell of them with each", () => {
+    const place = vi.fn(([x, y]: readonly number[]): [number, number] => [x!, y!]);
+    const counted = new Marks(root, place);
+    const told = (): void => {
+      counted.set("pins", [{ points: [[1, 2, 3]], label: "probe 1", kind: "probe" }]);
+      counted.set("worst", []);
+    };
+    told();
+    place.mockClear();
+    told();
+    expect(place).not.toHaveBeenCalled();
+    counted.draw();
+    expect(place).toHaveBeenCalledTimes(1);
   });
 
   it("plots pinned places, each field by itself, and forgets them", () => {

@@ -17,6 +17,14 @@ describe("picking", () => {
     expect(edges([0, 1, 1, 1])).toContain("0-2");
   });
 
+  it("finds where more than two triangles meet, whatever their order", () => {
+    const three = Uint32Array.from([0, 1, 2, 1, 0, 3, 0, 1, 4]);
+    const found = [...featureEdges(three, new Uint32Array(3), 5)];
+    const edges = Array.from({ length: found.length / 2 }, (_, i) => `${found[2 * i]}-${found[2 * i + 1]}`);
+    expect(edges).toEqual(["0-1", "0-2", "0-3", "0-4", "1-2", "1-3", "1-4"]);
+    expect(featureEdges(new Uint32Array(0), new Uint32Array(0), 0).length).toBe(0);
+  });
+
   it("measures boxes", () => {
     expect(bounds(points)).toEqual([[0, 0, 0], [1, 1, 1]]);
     expect(bounds(points, triangles, (triangle) => triangle >= 2)).toEqual([[0, 0, 1], [1, 1, 1]]);

@@ -1,0 +1,35 @@
+/** Views whose colours stand for the same have one range and one scalar bar. */
+import { colourKey } from "../store/looks";
+import type { Look } from "../store/looks";
+import type { Layer } from "./layer";
+import type { Coloured, Range, Ranges } from "./ranges";
+
+/** The colours that some views have in common, and the range that they stand for. */
+export interface Bar { key: string; look: Look; views: string[]; range: Range }
+
+/** Colours views by what they hold now; returns the bars of what is seen. What is hidden counts only where all that was does. */
+export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): Bar[] {
+  const groups = new Map<string, { look: Look; members: (Coloured & { layer: Layer })[] }>();
+  const remembered = new Set<string>();
+  for (const layer of layers) {
+    const { look, name } = layer;
+    const memory = JSON.stringify([name, look.field, look.component]);
+    remembered.add(memory);
+    const now = look.visible || look.range.kind === "over time" ? layer.takeScalars() : null;
+    const key = colourKey(look);
+    if (key === null || !now) continue;
+    const group = groups.get(key) ?? { look, members: [] };
+    groups.set(key, group);
+    group.members.push({ key: memory, now, isSeen: look.visible, layer });
+  }
+  const bars: Bar[] = [];
+  for (const [key, { look, members }] of groups) {
+    const range = ranges.range(members, look.range, held);
+    const seen = members.filter(({ isSeen }) => isSeen);
+    if (!range || seen.length === 0) continue;
+    for (const { layer } of seen) layer.paint(range);
+    bars.push({ key, look, range, views: seen.map(({ layer }) => layer.name) });
+  }
+  ranges.keep(remembered);
+  return bars;
+}
