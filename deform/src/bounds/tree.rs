@@ -179,6 +179,20 @@ mod tests {
         corners.iter().map(|c| Bounds::around([corner(&c[..3]), corner(&c[3..])])).collect()
     }
 
+    #[test]
+    fn no_box_is_around_a_point_that_is_not_a_number() {
+        let boxes = boxes(&[[0, 0, 0, 1, 1, 1], [1, 0, 0, 2, 1, 1]]);
+        let tree = BoxTree::new(&boxes);
+        for axis in 0..3 {
+            let mut point = [0.5; 3];
+            point[axis] = f64::NAN;
+            assert_eq!(boxes[0].squared_distance(point), f64::INFINITY);
+            assert!(!tree.contains(point));
+            tree.around(point, 1.0, |index| panic!("box {index}"));
+        }
+        assert_eq!(Bounds::EMPTY.squared_distance([0.5; 3]), f64::INFINITY);
+    }
+
     proptest! {
         /// As a look at every box finds them.
         #[test]

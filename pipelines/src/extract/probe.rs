@@ -167,7 +167,8 @@ impl<'a> Finder<'a> {
         Bounds::around(vertices.iter().map(at)).diagonal()
     }
 
-    /// Of the cells that a point lies in, that of the lowest key.
+    /// Of the cells that a point lies in, that of the lowest key. A point whose coordinates are not
+    /// finite lies in none.
     pub(super) fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
         let mut candidates = Vec::new();
         self.tree.around(point, self.slack, |index| candidates.push(self.cells[index as usize]));

@@ -177,6 +177,10 @@ impl Line {
         reached: &mut Vec<Reached>,
     ) -> Option<()> {
         let slope = slope.map(|part| self.sign() * part);
+        if self.stage > 0 && !slope.iter().all(|part| part.is_finite()) {
+            // Where the field is absent, as where there is no cell.
+            return self.halve().then_some(());
+        }
         let ahead = self.ahead();
         self.slopes[self.stage] = slope;
         if self.stage == 0 {
@@ -524,6 +528,40 @@ mod tests {
         let limit = Limit { most, ..LINE_POINTS };
         let (pattern, _) = pattern(&source, &input, &vectors, &seeds, &stage, limit)?;
         Ok(pattern.points.len())
+    }
+
+    /// A field may be absent in a part of the mesh.
+    #[test]
+    fn lines_end_where_the_field_does() {
+        let mesh = box_of_tets([8, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
+        let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let channel = Channel::new("fluid", part.view(), &[]);
+        let mut source = Source::new(&channel).unwrap();
+        let input = Input { channel: &channel, cycle: 0, wanted: &|_| false, communicator: &Solo };
+        source.update(&input).unwrap();
+        let finder = Finder::new(&source, ProbeMethod::Interpolated);
+        // Keys are asked for of the cells that a point may lie in.
+        assert!(finder.find([f64::NAN; 3], &|cell| panic!("cell {cell}")).is_none());
+        let field = |found: &Found| {
+            let is_there = |&(vertex, _): &(u32, f64)| part.points[vertex as usize][0] <= 1.0;
+            let is_there = found.row.iter().all(is_there);
+            [if is_there { 1.0 } else { f64::NAN }, 0.0, 0.0]
+        };
+        let ground = Ground { finder: &finder, key: &u64::from, field: &field };
+        let seeds = [[0.3, 0.41, 0.37], [0.1, 0.83, 0.22]];
+        let settings = Settings {
+            max_length: 10.0,
+            max_steps: 1000,
+            error: 1e-6,
+            least_speed: 1e-12,
+            points: LINE_POINTS,
+        };
+        let reached = follow(&Solo, &ground, &seeds, &[0, 2], &settings).unwrap();
+        for line in [0, 2] {
+            let ends = reached.iter().filter(|it| it.line == line).map(|it| it.point[0]);
+            let end = ends.fold(0.0, f64::max);
+            assert!((0.99..=1.0).contains(&end), "{end}");
+        }
     }
 
     #[test]
