@@ -8,7 +8,7 @@ use tombolo_deform::mesh::{
     ArrayView, CellType, Cells, FeatureSource, Mesh, MeshView, Values, Vector, ghosts,
 };
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets, single_cell};
-use tombolo_deform::vector::{cross, dot, length, polygon_normal, subtract};
+use tombolo_deform::vector::{add, cross, dot, length, polygon_normal, scale, subtract};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, FieldView, Snapshot};
 use tombolo_pipelines::language::parse;
 use tombolo_pipelines::run::{Output, Runner};
@@ -449,6 +449,28 @@ fn probes_keep_their_order_and_their_neighbours() {
     assert!((area(&extract) - 1.0).abs() < 1e-15);
     let nearest = r#"{"probe": {"points": [[0.4, 0.1, 0.1], [0.6, 0.1, 0.1]], "method": "nearest"}}, {"stream": {}}"#;
     assert_eq!(field(&once(nearest, &mesh, &fields), "x").values, [1.0 / 3.0, 2.0 / 3.0]);
+}
+
+/// Geographic coordinates, in metres, and a face that lies aslant.
+#[test]
+fn a_probe_takes_what_lies_on_a_surface_but_for_rounding() {
+    let from = [5e5, 5e6, 300.0];
+    let points = vec![from, add(from, [90.0, 10.0, 20.0]), add(from, [15.0, 80.0, -10.0])];
+    let mut cells = Cells::new();
+    cells.push(CellType::Triangle, &[0, 1, 2]).unwrap();
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let at = |index: usize| mesh.points()[index];
+    let normal = cross(subtract(at(1), at(0)), subtract(at(2), at(0)));
+    let [a, b, c] = [0, 1, 2].map(at);
+    let middle: Vector = std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+    // In diagonals of the mesh, of some 124 m.
+    for (beside, is_found) in [(0.0, true), (0.5e-9, true), (-0.5e-9, true), (2e-9, false)] {
+        let [x, y, z] = add(middle, scale(normal, beside * 124.0 / length(normal)));
+        let probe = format!(r#"{{"probe": {{"points": [[{x}, {y}, {z}]]}}}}, {{"stream": {{}}}}"#);
+        let (extract, errors) = step(&mut runner(&probe, Arc::new(Solo)), 0, (&mesh).into(), &[]);
+        assert_eq!(errors.is_empty(), is_found, "{beside}: {errors:?}");
+        assert_eq!(extract.unwrap().points.len(), usize::from(is_found), "{beside}");
+    }
 }
 
 /// Hidden cells and copies are in nothing that is taken or derived, and what stands in them is
