@@ -186,6 +186,9 @@ pub(crate) fn solve([a, b, c]: [Vector; 3], products: Vector) -> Option<Vector> 
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
+/// How near its apex a point is taken for that of a pyramid, by its distance from the base.
+const APEX: f64 = 1e-12;
+
 /// The parametric coordinates of a point, by Newton's method; `None` where it does not converge.
 /// Of a cell of dimension 2 the third is the distance from it. A cell has at most 8 points.
 pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> Option<Vector> {
@@ -195,6 +198,13 @@ pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> O
     let from = from.get_mut(..points.len())?;
     for (from, vertex) in from.iter_mut().zip(points) {
         *from = subtract(*vertex, point);
+    }
+    // At the apex of a pyramid two tangents vanish.
+    if let (CellType::Pyramid, [base @ .., apex]) = (cell_type, &*from) {
+        let longest = base.iter().map(|from| length(*from)).fold(0.0, f64::max);
+        if length(*apex) < APEX * longest {
+            return Some([0.5, 0.5, 1.0]);
+        }
     }
     let mut at = center(cell_type);
     for _ in 0..50 {
@@ -291,6 +301,21 @@ mod tests {
     fn aslant(cell_type: CellType) -> Vec<Vector> {
         let turn = |[x, y, z]: &Vector| [*x, *y, z + x / 2.0 - y / 4.0];
         single_cell(cell_type).points().iter().map(turn).collect()
+    }
+
+    #[test]
+    fn corners_are_found() {
+        for cell_type in TYPES {
+            for points in [single_cell(cell_type).points().to_vec(), aslant(cell_type)] {
+                for (vertex, &point) in points.iter().enumerate() {
+                    let found = locate(cell_type, &points, point)
+                        .unwrap_or_else(|| panic!("{cell_type}: {vertex}"));
+                    assert!(is_inside(cell_type, found, 1e-12), "{cell_type}: {found:?}");
+                    let weights = shape(cell_type, found).unwrap();
+                    assert!((weights.weights()[vertex] - 1.0).abs() < 1e-12, "{cell_type}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -473,6 +473,23 @@ fn a_probe_takes_what_lies_on_a_surface_but_for_rounding() {
     }
 }
 
+#[test]
+fn the_apex_of_pyramids_lies_in_them() {
+    let mut points = single_cell(CellType::Hexahedron).points().to_vec();
+    points.push([0.5; 3]);
+    let mut cells = Cells::new();
+    for face in CellType::Hexahedron.faces() {
+        let mut corners: Vec<u32> = face.iter().rev().map(|&corner| corner as u32).collect();
+        corners.push(8);
+        cells.push(CellType::Pyramid, &corners).unwrap();
+    }
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let x = values(&mesh, |[x, y, z]| x + 2.0 * y + 4.0 * z);
+    let probe = r#"{"probe": {"points": [[0.5, 0.5, 0.5]]}}, {"stream": {}}"#;
+    let extract = once(probe, &mesh, &[FieldView::vertex("x", &x)]);
+    assert_eq!(field(&extract, "x").values, [3.5]);
+}
+
 /// Hidden cells and copies are in nothing that is taken or derived, and what stands in them is
 /// nobody's business.
 #[test]
