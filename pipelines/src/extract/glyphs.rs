@@ -13,7 +13,7 @@ use super::pattern::{Base, Pattern};
 use super::probe::{Finder, Found};
 use super::source::{Origin, Source};
 use super::{Association, ExtractError};
-use crate::language::{GlyphShape, Glyphs, GlyphsAt, ProbeMethod};
+use crate::language::{GlyphShape, Glyphs, GlyphsAt};
 use crate::limits::GLYPHS;
 
 /// The sides of an arrow.
@@ -181,7 +181,7 @@ fn spread(
 
 /// Of these points those that the lowest rank finds in its cells.
 fn at_points(source: &Source, communicator: &dyn Communicator, seeds: &[Vector]) -> Vec<Sampled> {
-    let finder = Finder::new(source, ProbeMethod::Interpolated);
+    let finder = Finder::kept(source);
     let rank = communicator.rank() as u64;
     let found: Vec<Option<Found>> =
         seeds.iter().map(|&seed| finder.find(seed, &u64::from)).collect();

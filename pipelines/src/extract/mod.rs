@@ -21,6 +21,7 @@ mod merge;
 mod pattern;
 mod positions;
 mod probe;
+mod search;
 mod seeds;
 mod shown;
 mod skin;

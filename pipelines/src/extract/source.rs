@@ -11,7 +11,9 @@ use tombolo_deform::surface::{Surface, SurfaceError};
 use super::blocks::Blocks;
 use super::gather::{self, Owners, Points};
 use super::layout::Layout;
+use super::pattern::Input;
 use super::positions::Positions;
+use super::search::Search;
 use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD};
 use tombolo_deform::communicator::{Communicator, agree};
 use tombolo_deform::distributed::{DistributedError, Part, PartBoundary};
@@ -120,6 +122,8 @@ pub struct Source {
     pub(super) boundary: Option<Boundary>,
     /// The blocks of the cells, once something was cut.
     blocks: OnceLock<Blocks>,
+    /// Its cells as they lie now, once points were looked for in them at a step.
+    search: OnceLock<Arc<Search>>,
     /// Where the vertices were when something was last cut.
     pub(super) positions: Positions,
     /// The knowledge that sets own cells apart from others: on several ranks, and where there are
@@ -381,6 +385,7 @@ impl Source {
             right_handed,
             boundary: None,
             blocks: OnceLock::new(),
+            search: OnceLock::new(),
             positions: Positions::default(),
             whole,
             is_part,
@@ -415,6 +420,29 @@ impl Source {
     /// The blocks of the cells.
     pub(super) fn blocks(&self) -> &Blocks {
         self.blocks.get_or_init(|| Blocks::new(&self.cells, self.key.points))
+    }
+
+    /// The tree in which points are looked for, kept until the mesh moves.
+    pub(super) fn search(&self) -> &Arc<Search> {
+        self.search.get_or_init(|| Arc::new(Search::new(self)))
+    }
+
+    /// That tree, where it was made already.
+    pub(super) fn kept_search(&self) -> Option<Arc<Search>> {
+        self.search.get().cloned()
+    }
+
+    /// Takes note of where the vertices are now.
+    ///
+    /// # Errors
+    /// [`ExtractError::PointNotFinite`]; there are no points then.
+    pub(crate) fn update(&mut self, input: &Input) -> Result<(), ExtractError> {
+        let before = self.positions.version;
+        let updated = self.positions.update(&input.channel.mesh.points, input.cycle);
+        if self.positions.version != before {
+            self.search = OnceLock::new();
+        }
+        updated
     }
 
     /// The cells, as the solver has them.

@@ -21,7 +21,7 @@ use super::layout::Layout;
 use super::pattern::{Base, Input, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
-use crate::language::{Direction, ProbeMethod, Streamlines};
+use crate::language::{Direction, Streamlines};
 use crate::limits::Limit;
 
 /// The weights of the slopes at each stage; the last are those of the result.
@@ -398,7 +398,7 @@ pub(super) fn pattern(
         least_speed: 1e-12 * fastest[0],
         points: limit,
     };
-    let finder = Finder::new(source, ProbeMethod::Interpolated);
+    let finder = Finder::kept(source);
     let field = |found: &Found| {
         let mut sum = [0.0; 3];
         for &(vertex, weight) in &found.row {
@@ -539,7 +539,7 @@ mod tests {
         let mut source = Source::new(&channel).unwrap();
         let input = Input { channel: &channel, cycle: 0, wanted: &|_| false, communicator: &Solo };
         source.update(&input).unwrap();
-        let finder = Finder::new(&source, ProbeMethod::Interpolated);
+        let finder = Finder::kept(&source);
         // Keys are asked for of the cells that a point may lie in.
         assert!(finder.find([f64::NAN; 3], &|cell| panic!("cell {cell}")).is_none());
         let field = |found: &Found| {

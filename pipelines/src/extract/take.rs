@@ -237,14 +237,6 @@ impl Source {
         Ok((0..view.values.len()).map(vector).collect())
     }
 
-    /// Takes note of where the vertices are now.
-    ///
-    /// # Errors
-    /// [`ExtractError::PointNotFinite`]; there are no points then.
-    pub(crate) fn update(&mut self, input: &Input) -> Result<(), ExtractError> {
-        self.positions.update(&input.channel.mesh.points, input.cycle)
-    }
-
     /// Where the vertices were when it was last taken note of.
     pub(crate) fn points(&self) -> &[Vector] {
         &self.positions.points
