@@ -211,7 +211,7 @@ impl Source {
             GlyphsAt::Points(seeds) => seeds::of(self, input, seeds)?,
             _ => Vec::new(),
         };
-        let pattern = glyphs::pattern(self, communicator, vectors.as_deref(), &seeds, stage)?;
+        let pattern = glyphs::pattern(self, input, vectors.as_deref(), &seeds, stage)?;
         Ok(pattern.fill_once(input))
     }
 
