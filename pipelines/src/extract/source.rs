@@ -252,7 +252,8 @@ impl Whole {
             .map(|cell| cell as u32)
             .collect();
         let taken = cells.subset(owners.iter().map(|&cell| cell as usize));
-        // Vertices of copies alone, and what no cell has, are somebody else's.
+        // Vertices of copies alone are somebody else's; those of no cell, as those that finer grids
+        // cover, are not matched between the ranks, and nobody's.
         let mut numbers = vec![u32::MAX; channel.mesh.points.len()];
         taken.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
         let vertices: Vec<u32> = (0..)
