@@ -353,6 +353,18 @@ fn formulas_take_fields_coordinates_and_time() {
 }
 
 #[test]
+fn magnitudes_of_large_vectors_are_finite() {
+    let mesh = box_of_tets([2, 1, 1], [0.0; 3], [1.0; 3]);
+    let u: Vec<Vector> = mesh.points().iter().map(|_| [3e200, 0.0, -4e200]).collect();
+    let stages = r#"{"magnitude": {"field": "u", "name": "speed"}}, {"threshold": {"field": "speed", "min": 1}}, {"write": {"file": "a.vtu"}}"#;
+    let extract = once(stages, &mesh, &[FieldView::vertex("u", &u)]);
+    assert_eq!(extract.cells.len(), mesh.cells().len());
+    assert!(
+        field(&extract, "speed").values.iter().all(|speed| (speed / 5e200 - 1.0).abs() < 1e-15)
+    );
+}
+
+#[test]
 fn mistakes_are_told_by_name() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
     let mut p = values(&mesh, |p| p[0]);

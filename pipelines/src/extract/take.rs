@@ -384,11 +384,7 @@ impl Source {
         }
         let mut values = Vec::with_capacity(view.values.len());
         for entity in 0..view.values.len() {
-            let value = match components {
-                1 => view.values.get(entity, 0),
-                _ => (0..components)
-                    .fold(0.0_f64, |sum, component| sum.hypot(view.values.get(entity, component))),
-            };
+            let value = view.values.magnitude(entity);
             let is_lacking = || is_absent(view.values.get(entity, 0));
             if !value.is_finite() && !is_lacking() && self.shows(view.association, entity) {
                 return Err(ExtractError::DecidingNotFinite {
