@@ -241,4 +241,36 @@ impl Extract {
         let cells = self.cells.bytes();
         size_of::<Vector>() * self.points.len() + cells + 8 * values
     }
+
+    /// Some of its points, with other cells between them and the cell that each of these is a part
+    /// of, whose values it has.
+    pub(crate) fn part(&self, points: &[u32], cells: Arc<Cells>, owners: &[u32]) -> Self {
+        let field = |field: &Field| {
+            let of = |entities: &[u32]| {
+                let tuple = |&entity: &u32| {
+                    &field.values[entity as usize * field.components..][..field.components]
+                };
+                entities.iter().flat_map(tuple).copied().collect()
+            };
+            let values = match field.association {
+                Association::Vertex => of(points),
+                Association::Element => of(owners),
+                Association::Mesh => field.values.clone(),
+            };
+            Field { values, ..field.clone() }
+        };
+        let of_points =
+            |all: &Arc<[u32]>| points.iter().map(|&point| all[point as usize]).collect();
+        let features = self.features.as_ref().map(|features| {
+            let of_cells = owners.iter().map(|&cell| features.of_cells[cell as usize]).collect();
+            ExtractFeatures { names: features.names.clone(), of_cells }.into()
+        });
+        Self {
+            points: points.iter().map(|&point| self.points[point as usize]).collect(),
+            vertices: self.vertices.as_ref().map(of_points),
+            cells,
+            features,
+            fields: self.fields.iter().map(field).collect(),
+        }
+    }
 }

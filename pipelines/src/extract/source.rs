@@ -254,15 +254,7 @@ impl Whole {
         let taken = cells.subset(owners.iter().map(|&cell| cell as usize));
         // Vertices of copies alone are somebody else's; those of no cell, as those that finer grids
         // cover, are not matched between the ranks, and nobody's.
-        let mut numbers = vec![u32::MAX; channel.mesh.points.len()];
-        taken.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
-        let vertices: Vec<u32> = (0..)
-            .zip(&numbers)
-            .filter(|(_, number)| **number == 0)
-            .map(|(vertex, _)| vertex)
-            .collect();
-        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
-        let taken = taken.with_vertices(&numbers);
+        let (taken, vertices) = taken.compact(channel.mesh.points.len());
         let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
         let from = Points::Vertices(&vertices);
         let (mut fields, errors) =

@@ -319,17 +319,10 @@ impl Source {
     fn whole_cells(&self, owners: Vec<u32>) -> Result<Pattern, ExtractError> {
         let points = &self.positions.points;
         let cells = self.cells().subset(owners.iter().map(|&cell| cell as usize));
-        let mut numbers = vec![u32::MAX; points.len()];
-        cells.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
-        let vertices: Vec<u32> = (0..)
-            .zip(&numbers)
-            .filter(|(_, number)| **number == 0)
-            .map(|(vertex, _)| vertex)
-            .collect();
-        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
+        let (cells, vertices) = cells.compact(points.len());
         Ok(Pattern {
             points: vertices.iter().map(|&vertex| points[vertex as usize]).collect(),
-            cells: Arc::new(cells.with_vertices(&numbers)),
+            cells: Arc::new(cells),
             base: Base::Vertices(vertices.into()),
             owners: owners.into(),
             origin: Origin::Vertices,
