@@ -134,11 +134,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
         let (face, rest) =
             corners.split_at_checked(size as usize).ok_or("more points than the faces have")?;
         corners = rest;
-        let cell_type = match size {
-            3 => CellType::Triangle,
-            4 => CellType::Quad,
-            _ => CellType::Polygon,
-        };
+        let cell_type = CellType::of_polygon(face.len());
         faces.push(cell_type, face).map_err(|failure| failure.to_string())?;
     }
     if corners.is_empty() {
