@@ -34,7 +34,7 @@ mod walls;
 pub use check::{ChannelError, check_field_length, check_names};
 pub(crate) use decimate::Decimation;
 pub use error::ExtractError;
-pub(crate) use error::unknown_field;
+pub(crate) use error::{unknown_feature, unknown_field};
 pub(crate) use function::unit;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
@@ -43,6 +43,7 @@ pub(crate) use shown::{Shown, shown};
 pub(crate) use skin::skin;
 pub(crate) use source::Support;
 pub use source::{Extracted, MeshKey, Source};
+pub(crate) use statistics::CHUNK;
 pub use statistics::{FieldStatistics, statistics};
 pub(crate) use walls::Walls;
 
@@ -51,7 +52,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::{ArrayView, Cells, MeshView, NumberType, Vector};
 
-use tombolo_deform::names::nearest;
+use tombolo_deform::names::hint;
 
 /// The entities that a field has one value for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
@@ -182,8 +183,7 @@ impl<'a> Channel<'a> {
             let Some(name) = name.filter(|_| !known.is_empty()) else {
                 return "the solver has no channel".to_owned();
             };
-            let hint = nearest(name, known.iter().copied())
-                .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = hint(name, known.iter().copied());
             format!(
                 "the solver has no channel `{name}`; its channels are {}{hint}",
                 known.join(", ")

@@ -21,8 +21,8 @@ pub struct FieldStatistics {
     pub first_non_finite: Option<(usize, f64)>,
 }
 
-/// How many tuples are added up before their sum is: the sums lose less to rounding.
-const CHUNK: usize = 4096;
+/// How many tuples or cells are added up before their sum is: the sums lose less to rounding.
+pub(crate) const CHUNK: usize = 4096;
 
 /// The statistics of a field over the vertices or cells of all ranks for which `counts` holds.
 /// Collective.
