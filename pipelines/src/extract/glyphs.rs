@@ -10,7 +10,7 @@ use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
-use super::gather::Rows;
+use super::gather::{Rows, weighted};
 use super::pattern::{Base, Input, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
@@ -44,13 +44,9 @@ pub(super) fn pattern(
         GlyphsAt::Points(_) => at_points(source, input, seeds),
     };
     check_count(communicator, places.len())?;
-    let vector = |found: &Found| {
-        let mut sum = [0.0; 3];
-        for &(vertex, weight) in &found.row {
-            let vector = vectors.map_or([1.0, 0.0, 0.0], |all| all[vertex as usize]);
-            (0..3).for_each(|axis| sum[axis] += weight * vector[axis]);
-        }
-        sum
+    let vector = |found: &Found| match vectors {
+        Some(vectors) => weighted(&found.row, vectors),
+        None => [1.0, 0.0, 0.0],
     };
     let along: Vec<Vector> = places.iter().map(|(_, found)| vector(found)).collect();
     let own = along.iter().map(|vector| length(*vector)).filter(|size| size.is_finite());

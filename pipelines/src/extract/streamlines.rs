@@ -16,7 +16,7 @@ use tombolo_deform::mesh::{Cells, Vector};
 use tombolo_deform::vector::{distance, length};
 
 use super::ExtractError;
-use super::gather::Rows;
+use super::gather::{Rows, weighted};
 use super::layout::Layout;
 use super::pattern::{Base, Input, Pattern};
 use super::probe::{Finder, Found, keys};
@@ -399,14 +399,7 @@ pub(super) fn pattern(
         points: limit,
     };
     let finder = Finder::kept(source);
-    let field = |found: &Found| {
-        let mut sum = [0.0; 3];
-        for &(vertex, weight) in &found.row {
-            let vector = vectors[vertex as usize];
-            (0..3).for_each(|axis| sum[axis] += weight * vector[axis]);
-        }
-        sum
-    };
+    let field = |found: &Found| weighted(&found.row, vectors);
     #[expect(clippy::cast_possible_truncation, reason = "a limited number of seeds")]
     let of_seed = |seed: usize| {
         let (forward, backward) = (2 * seed as u32, 2 * seed as u32 + 1);

@@ -168,13 +168,7 @@ impl Source {
         input: &Input,
         stage: &Streamlines,
     ) -> Result<Extracted, ExtractError> {
-        let communicator = input.communicator;
-        let found = self.update(input).and_then(|()| self.vectors(input, &stage.field));
-        let all_have = !communicator.any(found.is_err());
-        let vectors = found?;
-        if !all_have {
-            return Err(ExtractError::Elsewhere);
-        }
+        let vectors = self.agreed_vectors(input, Some(&stage.field))?.unwrap_or_default();
         let seeds = seeds::of(self, input, &stage.seeds)?;
         let (pattern, times) =
             streamlines::pattern(self, input, &vectors, &seeds, stage, LINE_POINTS)?;
@@ -197,22 +191,28 @@ impl Source {
     /// # Errors
     /// As [`streamlines`](Self::streamlines).
     pub fn glyphs(&mut self, input: &Input, stage: &Glyphs) -> Result<Extracted, ExtractError> {
-        let communicator = input.communicator;
-        let found = self.update(input).and_then(|()| match &stage.field {
-            Some(name) => self.vectors(input, name).map(Some),
-            None => Ok(None),
-        });
-        let all_have = !communicator.any(found.is_err());
-        let vectors = found?;
-        if !all_have {
-            return Err(ExtractError::Elsewhere);
-        }
+        let vectors = self.agreed_vectors(input, stage.field.as_deref())?;
         let seeds = match &stage.at {
             GlyphsAt::Points(seeds) => seeds::of(self, input, seeds)?,
             _ => Vec::new(),
         };
         let pattern = glyphs::pattern(self, input, vectors.as_deref(), &seeds, stage)?;
         Ok(pattern.fill_once(input))
+    }
+
+    /// The vectors of a field where all ranks have them, and know where the vertices are now.
+    /// Collective.
+    fn agreed_vectors(
+        &mut self,
+        input: &Input,
+        field: Option<&str>,
+    ) -> Result<Option<Vec<Vector>>, ExtractError> {
+        let found = self.update(input);
+        let found = found.and_then(|()| field.map(|name| self.vectors(input, name)).transpose());
+        if input.communicator.any(found.is_err()) {
+            return Err(found.err().unwrap_or(ExtractError::Elsewhere));
+        }
+        found
     }
 
     /// The vector that a vertex field has at each vertex.
