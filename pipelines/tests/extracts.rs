@@ -483,6 +483,21 @@ fn a_probe_takes_what_lies_on_a_surface_but_for_rounding() {
         assert_eq!(errors.is_empty(), is_found, "{beside}: {errors:?}");
         assert_eq!(extract.unwrap().points.len(), usize::from(is_found), "{beside}");
     }
+    // Of a small face the rounding of the coordinates is what counts.
+    let points: Vec<Vector> =
+        [at(0), at(1), at(2)].map(|point| add(at(0), scale(subtract(point, at(0)), 1e-3))).to_vec();
+    let mesh = mesh.with_points(points).unwrap();
+    let [a, b, c] = [0, 1, 2].map(|index| mesh.points()[index]);
+    let inside = (1..10).map(|step| {
+        let part = f64::from(step) / 20.0;
+        let [x, y, z] =
+            add(a, add(scale(subtract(b, a), part), scale(subtract(c, a), 0.45 - part / 2.0)));
+        format!("[{x}, {y}, {z}]")
+    });
+    let inside: Vec<String> = inside.collect();
+    let probe =
+        format!(r#"{{"probe": {{"points": [{}]}}}}, {{"stream": {{}}}}"#, inside.join(", "));
+    assert_eq!(once(&probe, &mesh, &[]).points.len(), 9);
 }
 
 #[test]

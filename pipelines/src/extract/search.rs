@@ -10,6 +10,9 @@ use super::source::Source;
 /// and in diagonals of the cells' bounding box.
 pub(super) const SLACK: f64 = 1e-9;
 
+/// By how much of the largest coordinate a point may lie beside a cell, all the same.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// The own cells of a rank that have an inside, where they are now.
 #[derive(Debug)]
 pub(super) struct Search {
@@ -35,7 +38,11 @@ impl Search {
         };
         let boxes: Vec<Bounds> = own.iter().map(bounds).collect();
         let all = boxes.iter().fold(Bounds::EMPTY, |all, bounds| all.join(bounds));
-        let slack = if own.is_empty() { 0.0 } else { SLACK * all.diagonal() };
+        // In a face that lies far from the origin, what lies in it is rounded by more.
+        let largest =
+            all.corners().as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let slack = (SLACK * all.diagonal()).max(ROUNDING * largest);
+        let slack = if own.is_empty() { 0.0 } else { slack };
         Self { cells: own, tree: BoxTree::new(&boxes), slack }
     }
 
