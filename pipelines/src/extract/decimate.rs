@@ -14,7 +14,7 @@ use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
-use super::Extract;
+use super::{Extract, ExtractFeatures};
 use crate::language::Decimate;
 
 /// By how much more a bend of a border counts than one of the surface.
