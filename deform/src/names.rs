@@ -48,3 +48,17 @@ pub fn near<'a>(
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     near(name, known).next()
 }
+
+/// What an error says at its end of the known name that is nearest to a misspelt one; nothing where
+/// none is [`near`].
+///
+/// ```
+/// use tombolo_deform::names::hint;
+///
+/// assert_eq!(hint("presure", ["velocity", "pressure"]), "; did you mean `pressure`?");
+/// assert_eq!(hint("zebra", ["velocity", "pressure"]), "");
+/// ```
+#[must_use]
+pub fn hint<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(name, known).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
+}

@@ -186,8 +186,11 @@ pub(crate) fn solve([a, b, c]: [Vector; 3], products: Vector) -> Option<Vector> 
     solution.iter().all(|x| x.is_finite()).then_some(solution)
 }
 
+/// How near its apex a point is taken for that of a pyramid, by its distance from the base.
+const APEX: f64 = 1e-12;
+
 /// The parametric coordinates of a point, by Newton's method; `None` where it does not converge.
-/// A cell has at most 8 points.
+/// Of a cell of dimension 2 the third is the distance from it. A cell has at most 8 points.
 pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> Option<Vector> {
     let dimension = cell_type.dimension();
     // Measured from the point, what is rounded is as small as the cell, however far away it lies.
@@ -195,6 +198,13 @@ pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> O
     let from = from.get_mut(..points.len())?;
     for (from, vertex) in from.iter_mut().zip(points) {
         *from = subtract(*vertex, point);
+    }
+    // At the apex of a pyramid two tangents vanish.
+    if let (CellType::Pyramid, [base @ .., apex]) = (cell_type, &*from) {
+        let longest = base.iter().map(|from| length(*from)).fold(0.0, f64::max);
+        if length(*apex) < APEX * longest {
+            return Some([0.5, 0.5, 1.0]);
+        }
     }
     let mut at = center(cell_type);
     for _ in 0..50 {
@@ -205,11 +215,15 @@ pub(crate) fn locate(cell_type: CellType, points: &[Vector], point: Vector) -> O
         // The rows of the matrix whose columns are the tangents.
         let rows = [0, 1, 2].map(|axis| [a[axis], b[axis], c[axis]]);
         let step = scale(solve(rows, beside)?, -1.0);
-        at = add(at, step);
-        if at.iter().any(|x| x.abs() > 1e3) {
+        (0..dimension).for_each(|axis| at[axis] += step[axis]);
+        if dimension == 2 {
+            // Each step tells the whole distance, in units of the mesh: nothing that converges.
+            at[2] = step[2];
+        }
+        if at[..dimension].iter().any(|x| x.abs() > 1e3) {
             return None;
         }
-        if step.iter().all(|x| x.abs() < 1e-10) {
+        if step[..dimension].iter().all(|x| x.abs() < 1e-10) {
             return Some(at);
         }
     }
@@ -283,15 +297,54 @@ mod tests {
         }
     }
 
+    /// A cell, turned out of the planes of the axes.
+    fn aslant(cell_type: CellType) -> Vec<Vector> {
+        let turn = |[x, y, z]: &Vector| [*x, *y, z + x / 2.0 - y / 4.0];
+        single_cell(cell_type).points().iter().map(turn).collect()
+    }
+
+    #[test]
+    fn corners_are_found() {
+        for cell_type in TYPES {
+            for points in [single_cell(cell_type).points().to_vec(), aslant(cell_type)] {
+                for (vertex, &point) in points.iter().enumerate() {
+                    let found = locate(cell_type, &points, point)
+                        .unwrap_or_else(|| panic!("{cell_type}: {vertex}"));
+                    assert!(is_inside(cell_type, found, 1e-12), "{cell_type}: {found:?}");
+                    let weights = shape(cell_type, found).unwrap();
+                    assert!((weights.weights()[vertex] - 1.0).abs() < 1e-12, "{cell_type}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_distance_from_a_face_is_told() {
+        for cell_type in [CellType::Triangle, CellType::Quad, CellType::Pixel] {
+            for (size, beside) in [(1.0, 5e-10), (1.0, 0.3), (100.0, -1e-8)] {
+                let points: Vec<Vector> =
+                    aslant(cell_type).iter().map(|&it| scale(it, size)).collect();
+                let shape = shape(cell_type, [0.3, 0.4, 0.0]).unwrap();
+                let [.., normal] = shape.tangents(&points, 2);
+                let parts = points.iter().zip(shape.weights());
+                let point = parts
+                    .fold(scale(normal, beside), |sum, (it, part)| add(sum, scale(*it, *part)));
+                let [r, s, distance] = locate(cell_type, &points, point).unwrap();
+                assert!((r - 0.3).abs() < 1e-12 && (s - 0.4).abs() < 1e-12, "{cell_type}");
+                assert!((distance - beside).abs() < 1e-14 * size, "{cell_type}: {distance}");
+            }
+        }
+    }
+
     /// Geographic coordinates are in metres, millions of them from their origin.
     #[test]
     fn points_are_found_far_from_the_origin() {
         for cell_type in TYPES {
             let flat = if cell_type.dimension() == 2 { 0.0 } else { 1.0 };
             for far in [1e4, 5e5, 5e6] {
-                let offset = [far, -0.7 * far, 0.3 * far * flat];
+                let offset = [far, -0.7 * far, 0.3 * far];
                 let points: Vec<Vector> =
-                    single_cell(cell_type).points().iter().map(|&it| add(it, offset)).collect();
+                    aslant(cell_type).iter().map(|&it| add(it, offset)).collect();
                 for step in 1..100 {
                     let part = f64::from(step) / 300.0;
                     let inside = [part, 0.3 - part / 2.0, flat * (0.1 + part / 2.0)];

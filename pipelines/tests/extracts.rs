@@ -8,7 +8,7 @@ use tombolo_deform::mesh::{
     ArrayView, CellType, Cells, FeatureSource, Mesh, MeshView, Values, Vector, ghosts,
 };
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets, single_cell};
-use tombolo_deform::vector::{cross, dot, length, polygon_normal, subtract};
+use tombolo_deform::vector::{add, cross, dot, length, polygon_normal, scale, subtract};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, FieldView, Snapshot};
 use tombolo_pipelines::language::parse;
 use tombolo_pipelines::run::{Output, Runner};
@@ -353,6 +353,18 @@ fn formulas_take_fields_coordinates_and_time() {
 }
 
 #[test]
+fn magnitudes_of_large_vectors_are_finite() {
+    let mesh = box_of_tets([2, 1, 1], [0.0; 3], [1.0; 3]);
+    let u: Vec<Vector> = mesh.points().iter().map(|_| [3e200, 0.0, -4e200]).collect();
+    let stages = r#"{"magnitude": {"field": "u", "name": "speed"}}, {"threshold": {"field": "speed", "min": 1}}, {"write": {"file": "a.vtu"}}"#;
+    let extract = once(stages, &mesh, &[FieldView::vertex("u", &u)]);
+    assert_eq!(extract.cells.len(), mesh.cells().len());
+    assert!(
+        field(&extract, "speed").values.iter().all(|speed| (speed / 5e200 - 1.0).abs() < 1e-15)
+    );
+}
+
+#[test]
 fn mistakes_are_told_by_name() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
     let mut p = values(&mesh, |p| p[0]);
@@ -449,6 +461,60 @@ fn probes_keep_their_order_and_their_neighbours() {
     assert!((area(&extract) - 1.0).abs() < 1e-15);
     let nearest = r#"{"probe": {"points": [[0.4, 0.1, 0.1], [0.6, 0.1, 0.1]], "method": "nearest"}}, {"stream": {}}"#;
     assert_eq!(field(&once(nearest, &mesh, &fields), "x").values, [1.0 / 3.0, 2.0 / 3.0]);
+}
+
+/// Geographic coordinates, in metres, and a face that lies aslant.
+#[test]
+fn a_probe_takes_what_lies_on_a_surface_but_for_rounding() {
+    let from = [5e5, 5e6, 300.0];
+    let points = vec![from, add(from, [90.0, 10.0, 20.0]), add(from, [15.0, 80.0, -10.0])];
+    let mut cells = Cells::new();
+    cells.push(CellType::Triangle, &[0, 1, 2]).unwrap();
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let at = |index: usize| mesh.points()[index];
+    let normal = cross(subtract(at(1), at(0)), subtract(at(2), at(0)));
+    let [a, b, c] = [0, 1, 2].map(at);
+    let middle: Vector = std::array::from_fn(|axis| (a[axis] + b[axis] + c[axis]) / 3.0);
+    // In diagonals of the mesh, of some 124 m.
+    for (beside, is_found) in [(0.0, true), (0.5e-9, true), (-0.5e-9, true), (2e-9, false)] {
+        let [x, y, z] = add(middle, scale(normal, beside * 124.0 / length(normal)));
+        let probe = format!(r#"{{"probe": {{"points": [[{x}, {y}, {z}]]}}}}, {{"stream": {{}}}}"#);
+        let (extract, errors) = step(&mut runner(&probe, Arc::new(Solo)), 0, (&mesh).into(), &[]);
+        assert_eq!(errors.is_empty(), is_found, "{beside}: {errors:?}");
+        assert_eq!(extract.unwrap().points.len(), usize::from(is_found), "{beside}");
+    }
+    // Of a small face the rounding of the coordinates is what counts.
+    let points: Vec<Vector> =
+        [at(0), at(1), at(2)].map(|point| add(at(0), scale(subtract(point, at(0)), 1e-3))).to_vec();
+    let mesh = mesh.with_points(points).unwrap();
+    let [a, b, c] = [0, 1, 2].map(|index| mesh.points()[index]);
+    let inside = (1..10).map(|step| {
+        let part = f64::from(step) / 20.0;
+        let [x, y, z] =
+            add(a, add(scale(subtract(b, a), part), scale(subtract(c, a), 0.45 - part / 2.0)));
+        format!("[{x}, {y}, {z}]")
+    });
+    let inside: Vec<String> = inside.collect();
+    let probe =
+        format!(r#"{{"probe": {{"points": [{}]}}}}, {{"stream": {{}}}}"#, inside.join(", "));
+    assert_eq!(once(&probe, &mesh, &[]).points.len(), 9);
+}
+
+#[test]
+fn the_apex_of_pyramids_lies_in_them() {
+    let mut points = single_cell(CellType::Hexahedron).points().to_vec();
+    points.push([0.5; 3]);
+    let mut cells = Cells::new();
+    for face in CellType::Hexahedron.faces() {
+        let mut corners: Vec<u32> = face.iter().rev().map(|&corner| corner as u32).collect();
+        corners.push(8);
+        cells.push(CellType::Pyramid, &corners).unwrap();
+    }
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let x = values(&mesh, |[x, y, z]| x + 2.0 * y + 4.0 * z);
+    let probe = r#"{"probe": {"points": [[0.5, 0.5, 0.5]]}}, {"stream": {}}"#;
+    let extract = once(probe, &mesh, &[FieldView::vertex("x", &x)]);
+    assert_eq!(field(&extract, "x").values, [3.5]);
 }
 
 /// Hidden cells and copies are in nothing that is taken or derived, and what stands in them is

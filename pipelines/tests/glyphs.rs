@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::Part;
-use tombolo_deform::mesh::{Mesh, Vector};
-use tombolo_deform::shapes::box_of_mixed_cells;
+use tombolo_deform::mesh::{CellType, Mesh, Vector};
+use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::language::parse;
 use tombolo_pipelines::run::{Output, Runner};
 
 fn glyphs(stage: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Option<Arc<Extract>> {
     let u: Vec<Vector> = part.points.iter().map(|&[x, ..]| [0.0, 1.0 + x, 0.0]).collect();
-    let fields = [FieldView::vertex("u", &u)];
+    let load: Vec<f64> = part.global_cells.iter().flatten().map(|&cell| cell as f64).collect();
+    let fields = [FieldView::vertex("u", &u), FieldView::element("load", &load)];
     let channels = [Channel::new("fluid", part.view(), &fields)];
     let text = format!(
         r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{{"glyphs": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}]}}"#
@@ -84,28 +85,52 @@ fn there_are_as_many_as_were_asked_for() {
     }
 }
 
+/// The triangles of glyphs, with the value that the solver's cell gave them.
+fn with_loads(extract: &Extract) -> Vec<[i64; 10]> {
+    let round = |point: &Vector| point.map(|x| (x * 1e9).round() as i64);
+    let load = extract.fields.iter().find(|field| field.name == "load").unwrap();
+    let triangle = |((_, corners), load): ((CellType, &[u32]), &f64)| {
+        let mut all = [*load as i64; 10];
+        for (slot, &corner) in all.chunks_mut(3).zip(corners) {
+            slot.copy_from_slice(&round(&extract.points[corner as usize]));
+        }
+        all
+    };
+    let mut triangles: Vec<_> = extract.cells.iter().zip(&load.values).map(triangle).collect();
+    triangles.sort_unstable();
+    triangles
+}
+
 #[test]
 fn ranks_make_those_that_one_process_makes() {
-    let mesh = mesh();
-    let count = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
-    for stage in [
-        r#"{"field": "u", "every": 3}"#,
-        r#"{"field": "u", "count": 50}"#,
-        r#"{"shape": "sphere", "grid": {"lower": [0, 0, 0], "upper": [2, 1, 1], "counts": [5, 4, 3]}}"#,
-    ] {
-        let whole = alone(stage);
-        let by_ranks = threads::run(3, |ranks| {
-            let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
-            glyphs(stage, &part, Arc::new(ranks))
-        });
-        let extract = by_ranks[0].as_ref().unwrap();
-        let sorted = |extract: &Extract| {
-            let round = |point: &Vector| point.map(|x| (x * 1e9).round() as i64);
-            let mut points: Vec<[i64; 3]> = extract.points.iter().map(round).collect();
-            points.sort_unstable();
-            (points, extract.cells.len())
+    let mixed = mesh();
+    let count = mixed.cells().len();
+    let in_turn = (0..count).map(|cell| cell * 7 / count % 3).collect();
+    // Vertices lie at equal distances from the middles of boxes, and the cells of a rank all about.
+    let even = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let mut cases: Vec<(&Mesh, Vec<usize>)> = vec![(&mixed, in_turn)];
+    let mut state = 1_u64;
+    for _ in 0..6 {
+        let mut dealt = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 33) as usize % 3
         };
-        assert!(sorted(extract) == sorted(&whole), "{stage}");
+        cases.push((&even, (0..even.cells().len()).map(|_| dealt()).collect()));
+    }
+    for (mesh, of_cells) in cases {
+        for stage in [
+            r#"{"field": "u", "every": 3}"#,
+            r#"{"field": "u", "count": 64}"#,
+            r#"{"shape": "sphere", "grid": {"lower": [0, 0, 0], "upper": [1, 1, 1], "counts": [5, 4, 3]}}"#,
+        ] {
+            let part = Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+            let whole = glyphs(stage, &part, Arc::new(Solo)).unwrap();
+            let by_ranks = threads::run(3, |ranks| {
+                let part = Part::cut(mesh, &of_cells, ranks.rank(), true).unwrap();
+                glyphs(stage, &part, Arc::new(ranks))
+            });
+            let extract = by_ranks[0].as_ref().unwrap();
+            assert!(with_loads(extract) == with_loads(&whole), "{stage}");
+        }
     }
 }

@@ -248,5 +248,5 @@ fn what_cannot_be_followed_is_told() {
         "streamlines: field `x` has 1 components, expected a vector of 2 or 3"
     );
     let error = told(r#"{"field": "u", "features": {"names": ["inlett"], "count": 3}}"#);
-    assert!(error.contains("there is no feature `inlett`"), "{error}");
+    assert!(error.contains("the surface has no feature `inlett`"), "{error}");
 }

@@ -96,14 +96,19 @@ impl Bounds {
         })
     }
 
-    /// The square of the distance of a point from the box, 0 inside. Infinite for no box.
+    /// The square of the distance of a point from the box, 0 inside. Infinite for no box, and for a
+    /// point with a coordinate that is NaN.
     #[inline]
     #[must_use]
     pub fn squared_distance(&self, point: Vector) -> f64 {
         let beside = |axis: usize| {
-            (self.lower[axis] - point[axis]).max(point[axis] - self.upper[axis]).max(0.0)
+            let beside = (self.lower[axis] - point[axis]).max(point[axis] - self.upper[axis]);
+            // Not `max`, which passes NaN over.
+            if beside <= 0.0 { 0.0 } else { beside }
         };
-        (0..3).map(|axis| beside(axis).powi(2)).sum()
+        let square: f64 = (0..3).map(|axis| beside(axis).powi(2)).sum();
+        // NaN becomes infinite.
+        square.min(f64::INFINITY)
     }
 
     /// Whether two boxes share a point.

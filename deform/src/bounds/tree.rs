@@ -1,5 +1,7 @@
 //! A tree of boxes.
 
+use std::cell::Cell;
+
 use super::{BITS, Bounds, along_curve};
 use crate::vector::Vector;
 
@@ -48,6 +50,7 @@ impl Boxed for Bounds {
 /// assert_eq!(around, [0, 1]);
 /// assert!(!tree.contains([1.75, 0.5, 0.5]));
 /// ```
+#[derive(Debug)]
 pub struct BoxTree<B = Bounds> {
     /// The box at each position along the curve, by its index.
     order: Vec<u32>,
@@ -99,6 +102,27 @@ impl<B: Boxed> BoxTree<B> {
                 }
             },
         );
+    }
+
+    /// The index of the box nearest to a point, the lowest of several, with the square of its
+    /// distance; `None` where all are further than `reach`.
+    #[must_use]
+    pub fn nearest(&self, point: Vector, reach: f64) -> Option<(u32, f64)> {
+        let best = Cell::new((reach * reach, u32::MAX));
+        self.descend(
+            |node, _, _| node.bounds().squared_distance(point) <= best.get().0,
+            |leaf| {
+                for position in self.positions(leaf) {
+                    let square = self.items[position].bounds().squared_distance(point);
+                    let (index, (least, lowest)) = (self.order[position], best.get());
+                    if square < least || square == least && index < lowest {
+                        best.set((square, index));
+                    }
+                }
+            },
+        );
+        let (square, index) = best.get();
+        (index < u32::MAX).then_some((index, square))
     }
 
     /// Whether a point lies in one of the boxes.
@@ -179,6 +203,21 @@ mod tests {
         corners.iter().map(|c| Bounds::around([corner(&c[..3]), corner(&c[3..])])).collect()
     }
 
+    #[test]
+    fn no_box_is_around_a_point_that_is_not_a_number() {
+        let boxes = boxes(&[[0, 0, 0, 1, 1, 1], [1, 0, 0, 2, 1, 1]]);
+        let tree = BoxTree::new(&boxes);
+        for axis in 0..3 {
+            let mut point = [0.5; 3];
+            point[axis] = f64::NAN;
+            assert_eq!(boxes[0].squared_distance(point), f64::INFINITY);
+            assert!(!tree.contains(point));
+            tree.around(point, 1.0, |index| panic!("box {index}"));
+            assert_eq!(tree.nearest(point, 1.0), None);
+        }
+        assert_eq!(Bounds::EMPTY.squared_distance([0.5; 3]), f64::INFINITY);
+    }
+
     proptest! {
         /// As a look at every box finds them.
         #[test]
@@ -195,6 +234,10 @@ mod tests {
             prop_assert_eq!(found, (0..boxes.len()).filter(near).collect::<Vec<_>>());
             let inside = |bounds: &Bounds| bounds.squared_distance(point) == 0.0;
             prop_assert_eq!(tree.contains(point), boxes.iter().any(inside));
+            let squares = (0..).zip(&boxes).map(|(index, it)| (index, it.squared_distance(point)));
+            let least = squares.min_by(|a, b| a.1.total_cmp(&b.1));
+            prop_assert_eq!(tree.nearest(point, 1e3), least);
+            prop_assert_eq!(tree.nearest(point, 1.0), least.filter(|(_, square)| *square <= 1.0));
         }
 
         /// As a look at every pair finds them, each once.

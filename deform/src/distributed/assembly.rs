@@ -210,11 +210,7 @@ impl Root {
             corners.clear();
             let of_face = &part.corners[start..start + part.sizes[face] as usize];
             corners.extend(of_face.iter().map(|&index| held[rank][index as usize]));
-            let cell_type = match corners.len() {
-                3 => CellType::Triangle,
-                4 => CellType::Quad,
-                _ => CellType::Polygon,
-            };
+            let cell_type = CellType::of_polygon(corners.len());
             faces.push(cell_type, &corners)?;
             owner_cells.push(cell);
             of_ranks[rank][face] = number;

@@ -278,6 +278,35 @@ impl<'a> ArrayView<'a> {
         })
     }
 
+    /// The value of a scalar, with its sign, and the magnitude of any other tuple. No square
+    /// overflows on the way to it.
+    ///
+    /// ```
+    /// use tombolo_deform::mesh::ArrayView;
+    ///
+    /// assert_eq!(ArrayView::vectors(&[[3.0, 0.0, -4.0]]).magnitude(0), 5.0);
+    /// assert_eq!(ArrayView::vectors(&[[1e200, 0.0, 0.0]]).magnitude(0), 1e200);
+    /// assert_eq!(ArrayView::scalars(&[-2.0]).magnitude(0), -2.0);
+    /// ```
+    ///
+    /// # Panics
+    /// Where `tuple` is out of range.
+    #[must_use]
+    #[inline]
+    pub fn magnitude(&self, tuple: usize) -> f64 {
+        if self.components == 1 {
+            return self.get(tuple, 0);
+        }
+        let parts = (0..self.components).map(|component| self.get(tuple, component));
+        let square: f64 = parts.clone().map(|part| part * part).sum();
+        // The root is the same everywhere, `hypot` is not.
+        if square.is_normal() {
+            square.sqrt()
+        } else {
+            parts.fold(0.0, |length: f64, part| length.hypot(part))
+        }
+    }
+
     /// The array as coordinates: one of single values is taken as `x0 y0 z0 x1 y1 z1 ...` where it
     /// has whole triples.
     pub(super) fn as_coordinates(self) -> Self {

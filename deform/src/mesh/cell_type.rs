@@ -78,6 +78,16 @@ impl CellType {
         self as u8
     }
 
+    /// The type of a polygon with so many corners: triangles and quadrilaterals have their own.
+    #[must_use]
+    pub const fn of_polygon(corners: usize) -> Self {
+        match corners {
+            3 => CellType::Triangle,
+            4 => CellType::Quad,
+            _ => CellType::Polygon,
+        }
+    }
+
     /// The dimension of the cell itself: 0 to 3.
     #[must_use]
     pub const fn dimension(self) -> usize {

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::cell_type::Types;
 use super::{CellType, MeshError};
+use crate::topology::{indices, marked, marks};
 
 /// Cells of any mix of linear types, as compressed rows of vertex numbers.
 ///
@@ -385,6 +386,26 @@ impl Cells {
             *vertex = numbers[*vertex as usize];
         }
         cells
+    }
+
+    /// The cells with only those of `points` points that they have, and which those are, rising.
+    ///
+    /// ```
+    /// use tombolo_deform::mesh::{CellType, Cells};
+    ///
+    /// let mut cells = Cells::new();
+    /// cells.push(CellType::Triangle, &[4, 2, 7])?;
+    /// let (compact, points) = cells.compact(9);
+    /// assert_eq!((compact.vertices(0), &*points), (&[1, 0, 2][..], &[2, 4, 7][..]));
+    /// # Ok::<(), tombolo_deform::mesh::MeshError>(())
+    /// ```
+    ///
+    /// # Panics
+    /// Where a cell names a point beyond those.
+    #[must_use]
+    pub fn compact(&self, points: usize) -> (Self, Vec<u32>) {
+        let used = marked(&marks(points, self.connectivity()));
+        (self.with_vertices(&indices(points, &used)), used)
     }
 
     /// The types whose cells were turned; `None` before any points have told.

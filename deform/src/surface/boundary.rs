@@ -65,11 +65,7 @@ impl BoundaryFaces {
                 if wanted.next_if(|face| face.face == position).is_none() {
                     return;
                 }
-                let cell_type = match vertices.len() {
-                    3 => CellType::Triangle,
-                    4 => CellType::Quad,
-                    _ => CellType::Polygon,
-                };
+                let cell_type = CellType::of_polygon(vertices.len());
                 // A face has three vertices at least, so that it is always taken.
                 if boundary.faces.push(cell_type, vertices).is_ok() {
                     boundary.cells.push(cell);

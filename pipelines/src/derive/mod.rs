@@ -132,8 +132,7 @@ impl Operand<'_> {
             if self.is_absent(entity) || !basis.source.shows(self.view.association, entity) {
                 return ABSENT;
             }
-            let square = |component: usize| values.get(entity, component).powi(2);
-            (0..values.components()).map(square).sum::<f64>().sqrt()
+            values.magnitude(entity).abs()
         };
         (0..values.len()).map(of).collect()
     }

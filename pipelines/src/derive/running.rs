@@ -24,7 +24,8 @@ pub(crate) struct Running {
     restored: Option<(Association, usize)>,
 }
 
-/// A length of time, and what the field did in it: what no measure asks for is empty.
+/// A length of time, and what the field did in it: what no measure asks for is empty. Where the field
+/// is NaN once, so is all of that block: it has one length, not one for each entity.
 #[derive(Debug, Default)]
 struct Block {
     length: f64,

@@ -29,15 +29,20 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[cfg(any(feature = "compression", feature = "decompression"))]
 mod blob;
 mod decoder;
 mod elements;
 mod encoder;
 mod error;
 mod layout;
+#[cfg(any(feature = "compression", feature = "decompression"))]
 mod surface;
 
 pub use decoder::{DecodedCells, DecodedFrame, Decoder, view_of};
 pub use encoder::{Encoded, Encoder};
 pub use error::{DecodeError, EncodeError};
-pub use surface::{decode_surface, encode_surface};
+#[cfg(any(feature = "compression", feature = "decompression"))]
+pub use surface::decode_surface;
+#[cfg(feature = "compression")]
+pub use surface::encode_surface;

@@ -4,18 +4,22 @@
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::surface::Surface;
 
-use super::blob::{MOST_BYTES, compress, decompress};
-use super::error::{DecodeError, EncodeError, error};
-use super::layout::{Kind, name, open, preamble, put_name};
-use crate::codec::bytes::{Input, put_block, put_count};
+use super::blob::{MOST_BYTES, decompress};
+use super::error::{DecodeError, error};
+use super::layout::{Kind, name, open};
+#[cfg(feature = "compression")]
+use super::{
+    blob::compress,
+    error::EncodeError,
+    layout::{preamble, put_name},
+};
+use crate::codec::bytes::Input;
 
-/// zstd's level: a surface is sent once.
-const LEVEL: i32 = 3;
 /// The most features of a surface.
 const MOST_FEATURES: usize = 1 << 16;
 
 /// Encodes a surface without loss: points in double precision, mesh vertex numbers, faces and
-/// features. About 32 bytes a vertex.
+/// features. About 32 bytes a vertex. With the feature `compression`.
 ///
 /// # Errors
 /// [`EncodeError`] where the compressor fails.
@@ -30,7 +34,11 @@ const MOST_FEATURES: usize = 1 << 16;
 /// assert_eq!(copy.features(), surface.features());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[cfg(feature = "compression")]
 pub fn encode_surface(surface: &Surface) -> Result<Vec<u8>, EncodeError> {
+    use crate::codec::bytes::{put_block, put_count};
+    /// zstd's level: a surface is sent once.
+    const LEVEL: i32 = 3;
     let (faces, features) = (surface.faces(), surface.features());
     #[expect(clippy::cast_possible_truncation, reason = "a face has fewer vertices than the mesh")]
     let sizes: Vec<u32> = faces.iter().map(|(_, corners)| corners.len() as u32).collect();
@@ -51,7 +59,8 @@ pub fn encode_surface(surface: &Surface) -> Result<Vec<u8>, EncodeError> {
 }
 
 /// Decodes a surface. Any bytes are answered with a surface or an error, and no more memory is
-/// taken than the arrays need that the message says it holds, at most 1 GiB.
+/// taken than the arrays need that the message says it holds, at most 1 GiB. With the feature
+/// `compression` or `decompression`.
 ///
 /// # Errors
 /// [`DecodeError`].
@@ -106,6 +115,7 @@ fn array(
 }
 
 /// Each number as the zigzag of its difference to the one before.
+#[cfg(feature = "compression")]
 fn differences(numbers: &[u32]) -> Vec<u8> {
     let mut previous = 0u32;
     let difference = |&number: &u32| {
@@ -116,7 +126,7 @@ fn differences(numbers: &[u32]) -> Vec<u8> {
     numbers.iter().flat_map(difference).collect()
 }
 
-/// The numbers behind [`differences`].
+/// The numbers behind the zigzags of their differences.
 fn sums(bytes: &[u8]) -> Vec<u32> {
     let mut number = 0u32;
     let sum = |&bytes: &[u8; 4]| {
@@ -134,11 +144,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
         let (face, rest) =
             corners.split_at_checked(size as usize).ok_or("more points than the faces have")?;
         corners = rest;
-        let cell_type = match size {
-            3 => CellType::Triangle,
-            4 => CellType::Quad,
-            _ => CellType::Polygon,
-        };
+        let cell_type = CellType::of_polygon(face.len());
         faces.push(cell_type, face).map_err(|failure| failure.to_string())?;
     }
     if corners.is_empty() {
@@ -148,7 +154,7 @@ fn faces(sizes: &[u32], mut corners: &[u32]) -> Result<Cells, String> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "compression"))]
 mod tests {
     use tombolo_deform::mesh::{FeatureSource, Mesh};
     use tombolo_deform::{features::FeatureSettings, shapes};

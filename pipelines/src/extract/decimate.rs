@@ -14,7 +14,7 @@ use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
-use super::{Association, Extract, ExtractFeatures, Field};
+use super::{Extract, ExtractFeatures};
 use crate::language::Decimate;
 
 /// By how much more a bend of a border counts than one of the surface.
@@ -53,20 +53,14 @@ impl Decimation {
         )]
         let wanted = (real(count) * stage.fraction).ceil() as usize;
         surface.reduce(wanted, stage.error.map_or(f64::INFINITY, |error| error * error));
-        let mut numbers = vec![u32::MAX; extract.points.len()];
         let alive = || surface.triangles.iter().zip(&surface.owners).filter(|(it, _)| is_alive(it));
-        alive().for_each(|(corners, _)| {
-            corners.iter().for_each(|&corner| numbers[corner as usize] = 0);
-        });
-        let kept: Vec<u32> =
-            (0..).zip(&numbers).filter(|(_, it)| **it == 0).map(|(point, _)| point).collect();
-        (0..).zip(&kept).for_each(|(number, &point)| numbers[point as usize] = number);
         let mut triangles = Cells::new();
         let mut owners = Vec::new();
         for (corners, owner) in alive() {
-            triangles.push(CellType::Triangle, &corners.map(|corner| numbers[corner as usize]))?;
+            triangles.push(CellType::Triangle, corners)?;
             owners.push(*owner);
         }
+        let (triangles, kept) = triangles.compact(extract.points.len());
         let left: Vec<[Vector; 3]> = alive()
             .map(|(corners, _)| corners.map(|corner| extract.points[corner as usize]))
             .collect();
@@ -89,35 +83,7 @@ impl Decimation {
 
     /// The surface with fewer triangles, with the present fields.
     pub(crate) fn apply(&self, extract: &Extract) -> Extract {
-        let field = |field: &Field| {
-            let of = |entities: &[u32]| {
-                let tuple = |&entity: &u32| {
-                    &field.values[entity as usize * field.components..][..field.components]
-                };
-                entities.iter().flat_map(tuple).copied().collect()
-            };
-            let values = match field.association {
-                Association::Vertex => of(&self.kept),
-                Association::Element => of(&self.owners),
-                Association::Mesh => field.values.clone(),
-            };
-            Field { values, ..field.clone() }
-        };
-        let features = extract.features.as_ref().map(|features| {
-            let of_cells =
-                self.owners.iter().map(|&cell| features.of_cells[cell as usize]).collect();
-            ExtractFeatures { names: features.names.clone(), of_cells }.into()
-        });
-        Extract {
-            points: self.kept.iter().map(|&point| extract.points[point as usize]).collect(),
-            vertices: extract
-                .vertices
-                .as_ref()
-                .map(|all| self.kept.iter().map(|&point| all[point as usize]).collect()),
-            cells: Arc::clone(&self.triangles),
-            features,
-            fields: extract.fields.iter().map(field).collect(),
-        }
+        extract.part(&self.kept, Arc::clone(&self.triangles), &self.owners)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use tombolo_deform::limits::Exceeded;
 use tombolo_deform::mesh::{MeshError, Vector};
-use tombolo_deform::names::nearest;
+use tombolo_deform::names::hint;
 use tombolo_deform::surface::SurfaceError;
 use tombolo_deform::vector::Position;
 
@@ -138,11 +138,16 @@ pub(crate) fn unknown_field<'a>(
     name: &str,
     known: impl Iterator<Item = &'a str> + Clone,
 ) -> String {
-    let hint = nearest(name, known.clone())
-        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    let hint = hint(name, known.clone());
     let known: Vec<&str> = known.collect();
     if known.is_empty() {
         return format!("the channel has no field `{name}`, nor any other");
     }
     format!("the channel has no field `{name}`; its fields are {}{hint}", known.join(", "))
+}
+
+/// A text that says that there is no such feature, which there are, and the nearest.
+pub(crate) fn unknown_feature(name: &str, known: &[String]) -> String {
+    let hint = hint(name, known.iter().map(String::as_str));
+    format!("the surface has no feature `{name}`; its features are {}{hint}", known.join(", "))
 }

@@ -1,6 +1,7 @@
 //! Values from the solver's arrays to the points and cells of an extract.
 
 use tombolo_deform::mesh::{ArrayView, NumberType, Vector};
+use tombolo_deform::vector::{add, scale};
 
 use super::{ABSENT, Association, Channel, ExtractError, Field, FieldView, is_absent};
 
@@ -49,6 +50,12 @@ impl Rows {
     pub(super) fn row(&self, point: usize) -> &[(u32, f64)] {
         &self.entries[self.offsets[point]..self.offsets[point + 1]]
     }
+}
+
+/// The sum of the vectors of some vertices by their weights.
+pub(super) fn weighted(row: &[(u32, f64)], vectors: &[Vector]) -> Vector {
+    let part = |&(vertex, weight): &(u32, f64)| scale(vectors[vertex as usize], weight);
+    row.iter().map(part).fold([0.0; 3], add)
 }
 
 /// A point between the two ends of an edge, or a vertex where they are one.

@@ -1,19 +1,21 @@
 //! Arrows and spheres that show a field.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use tombolo_deform::bounds::Bounds;
-use tombolo_deform::communicator::{Communicator, Reduction};
+use tombolo_deform::communicator::{Communicator, Reader, Reduction, Writer};
+use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
-use super::gather::Rows;
-use super::pattern::{Base, Pattern};
-use super::probe::{Finder, Found};
+use super::gather::{Rows, weighted};
+use super::pattern::{Base, Input, Pattern};
+use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
 use super::{Association, ExtractError};
-use crate::language::{GlyphShape, Glyphs, GlyphsAt, ProbeMethod};
+use crate::language::{GlyphShape, Glyphs, GlyphsAt};
 use crate::limits::GLYPHS;
 
 /// The sides of an arrow.
@@ -29,29 +31,22 @@ const RINGS: usize = 7;
 /// [`ExtractError::Seeds`] where there would be more than the limit; the same on all ranks.
 pub(super) fn pattern(
     source: &Source,
-    communicator: &dyn Communicator,
+    input: &Input,
     vectors: Option<&[Vector]>,
     seeds: &[Vector],
     stage: &Glyphs,
 ) -> Result<Pattern, ExtractError> {
+    let communicator = input.communicator;
     let bounds = bounds(source, communicator);
     let places = match &stage.at {
-        GlyphsAt::Spread(count) => spread(source, communicator, &bounds, *count),
-        GlyphsAt::Every(every) => {
-            at_vertices(source, |number| (number as usize).is_multiple_of(*every))
-        }
-        GlyphsAt::Points(_) => at_points(source, communicator, seeds),
+        GlyphsAt::Spread(count) => spread(source, input, &bounds, *count),
+        GlyphsAt::Every(nth) => every(source, input, *nth)?,
+        GlyphsAt::Points(_) => at_points(source, input, seeds),
     };
-    GLYPHS
-        .check(communicator.total(places.len()))
-        .map_err(|exceeded| ExtractError::Seeds(exceeded.to_string()))?;
-    let vector = |found: &Found| {
-        let mut sum = [0.0; 3];
-        for &(vertex, weight) in &found.row {
-            let vector = vectors.map_or([1.0, 0.0, 0.0], |all| all[vertex as usize]);
-            (0..3).for_each(|axis| sum[axis] += weight * vector[axis]);
-        }
-        sum
+    check_count(communicator, places.len())?;
+    let vector = |found: &Found| match vectors {
+        Some(vectors) => weighted(&found.row, vectors),
+        None => [1.0, 0.0, 0.0],
     };
     let along: Vec<Vector> = places.iter().map(|(_, found)| vector(found)).collect();
     let own = along.iter().map(|vector| length(*vector)).filter(|size| size.is_finite());
@@ -104,36 +99,92 @@ fn bounds(source: &Source, communicator: &dyn Communicator) -> Bounds {
 /// A point and the vertices that its values come from.
 type Sampled = (Vector, Found);
 
-/// The vertices of own cells whose numbers in the whole mesh are wanted.
-fn at_vertices(source: &Source, is_wanted: impl Fn(u32) -> bool) -> Vec<Sampled> {
-    let points = &source.positions.points;
+/// A vertex of own cells.
+struct Place {
+    /// Its number in the whole mesh.
+    number: u32,
+    /// Its number on this rank.
+    vertex: u32,
+    /// Of the own cells around it, that of the lowest key.
+    cell: u32,
+    key: u64,
+}
+
+impl Place {
+    fn sampled(&self, source: &Source) -> Sampled {
+        let found = Found { cell: self.cell, row: vec![(self.vertex, 1.0)] };
+        (source.positions.points[self.vertex as usize], found)
+    }
+}
+
+/// The vertices of own cells whose numbers in the whole mesh are wanted, by these numbers. Those
+/// that several ranks have, each of them brings. Collective.
+fn at_vertices(source: &Source, input: &Input, is_wanted: impl Fn(u32) -> bool) -> Vec<Place> {
+    let key = keys(source, input);
     let numbers = source.whole_mesh().map(|whole| whole.shared.numbers());
-    let mut places = Vec::new();
-    let mut is_known = vec![false; points.len()];
+    let mut lowest = vec![(u64::MAX, u32::MAX); source.positions.points.len()];
     #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
     for cell in (0..source.cells().len()).filter(|&cell| source.counts(Association::Element, cell))
     {
+        let of_cell = (key(cell as u32), cell as u32);
         for &vertex in source.cells().vertices(cell) {
-            let at = vertex as usize;
-            let number = numbers.map_or(vertex, |numbers| numbers[at]);
-            let is_new = !std::mem::replace(&mut is_known[at], true);
-            if is_new && source.counts(Association::Vertex, at) && is_wanted(number) {
-                let row = vec![(vertex, 1.0)];
-                places.push((number, (points[at], Found { cell: cell as u32, row })));
-            }
+            let known = &mut lowest[vertex as usize];
+            *known = of_cell.min(*known);
         }
     }
-    places.sort_by_key(|(number, _)| *number);
-    places.into_iter().map(|(_, place)| place).collect()
+    let place = |(vertex, (key, cell)): (u32, (u64, u32))| {
+        let number = numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
+        (cell < u32::MAX && is_wanted(number)).then_some(Place { number, vertex, cell, key })
+    };
+    let mut places: Vec<Place> = (0..).zip(lowest).filter_map(place).collect();
+    places.sort_by_key(|place| place.number);
+    places
 }
 
-/// Of all ranks' vertices the nearest to the middle of each of about `count` boxes.
-fn spread(
-    source: &Source,
-    communicator: &dyn Communicator,
-    bounds: &Bounds,
-    count: usize,
-) -> Vec<Sampled> {
+/// Every nth vertex of all ranks, each on the rank that has the cell of the lowest key around it.
+/// Collective.
+fn every(source: &Source, input: &Input, every: usize) -> Result<Vec<Sampled>, ExtractError> {
+    let communicator = input.communicator;
+    let mut places = at_vertices(source, input, |number| (number as usize).is_multiple_of(every));
+    let is_owned = |place: &&Place| source.counts(Association::Vertex, place.vertex as usize);
+    check_count(communicator, places.iter().filter(is_owned).count())?;
+    if let Some(whole) = source.whole_mesh().filter(|_| communicator.size() > 1) {
+        let mut message = Writer::default();
+        for place in places.iter().filter(|place| whole.is_shared[place.vertex as usize]) {
+            message.u32(place.number);
+            message.u64(place.key);
+        }
+        let mut lowest: HashMap<u32, (u64, usize)> = HashMap::new();
+        for (rank, bytes) in communicator.gather_all(&message.into_bytes()).iter().enumerate() {
+            let mut reader = Reader::new(rank, bytes);
+            while !reader.is_empty() {
+                let number = reader.u32().map_err(DistributedError::from)?;
+                let own = (reader.u64().map_err(DistributedError::from)?, rank);
+                let known = lowest.entry(number).or_insert(own);
+                *known = own.min(*known);
+            }
+        }
+        let rank = communicator.rank();
+        let is_lowest = |place: &Place| {
+            lowest.get(&place.number).is_none_or(|lowest| *lowest == (place.key, rank))
+        };
+        places.retain(is_lowest);
+    }
+    Ok(places.iter().map(|place| place.sampled(source)).collect())
+}
+
+/// Refuses more glyphs on all ranks than the limit; the same on all ranks. Collective.
+fn check_count(communicator: &dyn Communicator, own: usize) -> Result<(), ExtractError> {
+    let checked = GLYPHS.check(communicator.total(own));
+    checked.map_err(|exceeded| ExtractError::Seeds(exceeded.to_string()))
+}
+
+/// Of all ranks' vertices the nearest to the middle of each of about `count` boxes, and that of the
+/// lowest number where several are; each on the rank that has the cell of the lowest key around it.
+/// Collective.
+fn spread(source: &Source, input: &Input, bounds: &Bounds, count: usize) -> Vec<Sampled> {
+    let communicator = input.communicator;
+    let points = &source.positions.points;
     let extent = bounds.extent();
     // Cubes as large as leave about so many boxes; along a side without length there is one.
     let boxes = |side: f64| extent.map(|length| ((length / side).ceil() as usize).max(1));
@@ -144,15 +195,15 @@ fn spread(
         if middle > 0.0 && all(middle) <= count { most = middle } else { least = middle }
     }
     let counts = boxes(most);
-    let mut own: Vec<Option<Sampled>> = Vec::new();
+    // In the order of preference: the square of the distance, the number, the key.
+    let mut own: Vec<Option<([u64; 3], Place)>> = Vec::new();
     own.resize_with(counts.iter().product(), || None);
-    let mut nearest = vec![u64::MAX; own.len()];
-    for place in at_vertices(source, |_| true) {
+    for place in at_vertices(source, input, |_| true) {
         let mut index = 0;
         let mut square = 0.0;
         for axis in (0..3).rev() {
             let side = extent[axis] / real(counts[axis]);
-            let from = place.0[axis] - bounds.lower[axis];
+            let from = points[place.vertex as usize][axis] - bounds.lower[axis];
             let at = if side > 0.0 { (from / side).floor() as usize } else { 0 };
             let at = at.min(counts[axis] - 1);
             index = index * counts[axis] + at;
@@ -160,35 +211,33 @@ fn spread(
             square += aside * aside;
         }
         // Numbers above 0 are in the order of their bits.
-        let bits = square.to_bits();
-        if bits < nearest[index] {
-            (nearest[index], own[index]) = (bits, Some(place));
+        let order = [square.to_bits(), place.number.into(), place.key];
+        if own[index].as_ref().is_none_or(|(least, _)| order < *least) {
+            own[index] = Some((order, place));
         }
     }
-    let mut least = nearest.clone();
-    communicator.reduce_integers(Reduction::Minimum, &mut least);
-    let rank = communicator.rank() as u64;
-    let mut ranks: Vec<u64> = (0..own.len())
-        .map(|index| if nearest[index] == least[index] { rank } else { u64::MAX })
-        .collect();
-    communicator.reduce_integers(Reduction::Minimum, &mut ranks);
-    own.into_iter()
-        .zip(ranks)
-        .filter(|(_, first)| *first == rank)
-        .filter_map(|(it, _)| it)
-        .collect()
+    for part in 0..3 {
+        let of = |own: &Option<([u64; 3], Place)>| own.as_ref().map_or(u64::MAX, |it| it.0[part]);
+        let mut least: Vec<u64> = own.iter().map(of).collect();
+        communicator.reduce_integers(Reduction::Minimum, &mut least);
+        for (own, least) in own.iter_mut().zip(least) {
+            own.take_if(|(order, _)| order[part] > least);
+        }
+    }
+    own.iter().flatten().map(|(_, place)| place.sampled(source)).collect()
 }
 
-/// Of these points those that the lowest rank finds in its cells.
-fn at_points(source: &Source, communicator: &dyn Communicator, seeds: &[Vector]) -> Vec<Sampled> {
-    let finder = Finder::new(source, ProbeMethod::Interpolated);
-    let rank = communicator.rank() as u64;
-    let found: Vec<Option<Found>> =
-        seeds.iter().map(|&seed| finder.find(seed, &u64::from)).collect();
-    let mut ranks: Vec<u64> =
-        found.iter().map(|found| if found.is_some() { rank } else { u64::MAX }).collect();
-    communicator.reduce_integers(Reduction::Minimum, &mut ranks);
-    let own = seeds.iter().zip(found).zip(ranks).filter(|(_, first)| *first == rank);
+/// Of these points those that lie in a cell of this rank, and in none of a lower key. Collective.
+fn at_points(source: &Source, input: &Input, seeds: &[Vector]) -> Vec<Sampled> {
+    let finder = Finder::kept(source);
+    let key = keys(source, input);
+    let found: Vec<Option<Found>> = seeds.iter().map(|&seed| finder.find(seed, &key)).collect();
+    let of = |found: &Option<Found>| found.as_ref().map_or(u64::MAX, |found| key(found.cell));
+    let own: Vec<u64> = found.iter().map(of).collect();
+    let mut least = own.clone();
+    input.communicator.reduce_integers(Reduction::Minimum, &mut least);
+    let is_least = own.iter().zip(&least).map(|(own, least)| own == least);
+    let own = seeds.iter().zip(found).zip(is_least).filter(|(_, is_least)| *is_least);
     own.filter_map(|((&seed, found), _)| Some((seed, found?))).collect()
 }
 

@@ -21,6 +21,7 @@ mod merge;
 mod pattern;
 mod positions;
 mod probe;
+mod search;
 mod seeds;
 mod shown;
 mod skin;
@@ -33,7 +34,7 @@ mod walls;
 pub use check::{ChannelError, check_field_length, check_names};
 pub(crate) use decimate::Decimation;
 pub use error::ExtractError;
-pub(crate) use error::unknown_field;
+pub(crate) use error::{unknown_feature, unknown_field};
 pub(crate) use function::unit;
 pub(crate) use gather::check_length;
 pub(crate) use merge::merged;
@@ -42,6 +43,7 @@ pub(crate) use shown::{Shown, shown};
 pub(crate) use skin::skin;
 pub(crate) use source::Support;
 pub use source::{Extracted, MeshKey, Source};
+pub(crate) use statistics::CHUNK;
 pub use statistics::{FieldStatistics, statistics};
 pub(crate) use walls::Walls;
 
@@ -50,7 +52,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::{ArrayView, Cells, MeshView, NumberType, Vector};
 
-use tombolo_deform::names::nearest;
+use tombolo_deform::names::hint;
 
 /// The entities that a field has one value for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
@@ -181,8 +183,7 @@ impl<'a> Channel<'a> {
             let Some(name) = name.filter(|_| !known.is_empty()) else {
                 return "the solver has no channel".to_owned();
             };
-            let hint = nearest(name, known.iter().copied())
-                .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let hint = hint(name, known.iter().copied());
             format!(
                 "the solver has no channel `{name}`; its channels are {}{hint}",
                 known.join(", ")
@@ -239,5 +240,37 @@ impl Extract {
         let values: usize = self.fields.iter().map(|field| field.values.len()).sum();
         let cells = self.cells.bytes();
         size_of::<Vector>() * self.points.len() + cells + 8 * values
+    }
+
+    /// Some of its points, with other cells between them and the cell that each of these is a part
+    /// of, whose values it has.
+    pub(crate) fn part(&self, points: &[u32], cells: Arc<Cells>, owners: &[u32]) -> Self {
+        let field = |field: &Field| {
+            let of = |entities: &[u32]| {
+                let tuple = |&entity: &u32| {
+                    &field.values[entity as usize * field.components..][..field.components]
+                };
+                entities.iter().flat_map(tuple).copied().collect()
+            };
+            let values = match field.association {
+                Association::Vertex => of(points),
+                Association::Element => of(owners),
+                Association::Mesh => field.values.clone(),
+            };
+            Field { values, ..field.clone() }
+        };
+        let of_points =
+            |all: &Arc<[u32]>| points.iter().map(|&point| all[point as usize]).collect();
+        let features = self.features.as_ref().map(|features| {
+            let of_cells = owners.iter().map(|&cell| features.of_cells[cell as usize]).collect();
+            ExtractFeatures { names: features.names.clone(), of_cells }.into()
+        });
+        Self {
+            points: points.iter().map(|&point| self.points[point as usize]).collect(),
+            vertices: self.vertices.as_ref().map(of_points),
+            cells,
+            features,
+            fields: self.fields.iter().map(field).collect(),
+        }
     }
 }

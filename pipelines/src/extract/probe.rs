@@ -2,24 +2,21 @@
 
 use std::sync::Arc;
 
-use tombolo_deform::bounds::{Bounds, BoxTree};
+use tombolo_deform::bounds::Bounds;
 use tombolo_deform::communicator::Reduction;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::number::real;
 use tombolo_deform::vector::distance;
 
+use super::ExtractError;
 use super::decompose::Faces;
 use super::gather::Rows;
 use super::layout::Layout;
 use super::pattern::{Base, Input, Pattern};
+use super::search::{SLACK, Search};
 use super::source::{Origin, Source};
-use super::{Association, ExtractError};
 use crate::interpolation::{is_inside, locate, shape};
 use crate::language::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
-
-/// How far beside a cell a point may lie that is in it but for rounding: in parametric coordinates,
-/// and in diagonals of the cells' bounding box.
-const SLACK: f64 = 1e-9;
 
 /// The points of a probe.
 pub(super) fn points(at: &ProbeAt) -> (Vec<Vector>, Option<[usize; 3]>) {
@@ -134,30 +131,20 @@ pub(super) struct Found {
 pub(super) struct Finder<'a> {
     source: &'a Source,
     method: ProbeMethod,
-    /// The own cells.
-    cells: Vec<u32>,
-    tree: BoxTree,
-    slack: f64,
+    search: Arc<Search>,
 }
 
 impl<'a> Finder<'a> {
+    /// A finder that is needed once for the mesh as it lies.
     pub(super) fn new(source: &'a Source, method: ProbeMethod) -> Self {
-        let (cells, points) = (source.cells(), &source.positions.points);
-        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
-        let own: Vec<u32> = (0..cells.len())
-            .filter(|&cell| {
-                cells.cell_type(cell).dimension() >= 2 && source.counts(Association::Element, cell)
-            })
-            .map(|cell| cell as u32)
-            .collect();
-        let bounds = |&cell: &u32| {
-            let vertices = cells.vertices(cell as usize);
-            Bounds::around(vertices.iter().map(|&vertex| points[vertex as usize]))
-        };
-        let boxes: Vec<Bounds> = own.iter().map(bounds).collect();
-        let all = boxes.iter().fold(Bounds::EMPTY, |all, bounds| all.join(bounds));
-        let slack = if own.is_empty() { 0.0 } else { SLACK * all.diagonal() };
-        Self { source, method, cells: own, tree: BoxTree::new(&boxes), slack }
+        let search = source.kept_search().unwrap_or_else(|| Arc::new(Search::new(source)));
+        Self { source, method, search }
+    }
+
+    /// A finder that is needed at each step, as long as the mesh does not move.
+    pub(super) fn kept(source: &'a Source) -> Self {
+        let search = Arc::clone(source.search());
+        Self { source, method: ProbeMethod::Interpolated, search }
     }
 
     /// The diagonal of the box around a cell.
@@ -167,10 +154,10 @@ impl<'a> Finder<'a> {
         Bounds::around(vertices.iter().map(at)).diagonal()
     }
 
-    /// Of the cells that a point lies in, that of the lowest key.
+    /// Of the cells that a point lies in, that of the lowest key. A point whose coordinates are not
+    /// finite lies in none.
     pub(super) fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
-        let mut candidates = Vec::new();
-        self.tree.around(point, self.slack, |index| candidates.push(self.cells[index as usize]));
+        let mut candidates = self.search.around(point);
         candidates.sort_unstable_by_key(|&cell| key(cell));
         let found = |cell: u32| self.row(cell as usize, point).map(|row| Found { cell, row });
         let mut found = candidates.into_iter().find_map(found)?;
@@ -210,7 +197,7 @@ impl<'a> Finder<'a> {
             *slot = self.source.positions.points[vertex as usize];
         }
         let at = locate(cell_type, &points[..vertices.len()], point)?;
-        let is_beside = cell_type.dimension() == 2 && at[2].abs() > self.slack;
+        let is_beside = cell_type.dimension() == 2 && at[2].abs() > self.search.slack;
         if is_beside || !is_inside(cell_type, at, SLACK) {
             return None;
         }

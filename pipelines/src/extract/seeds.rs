@@ -3,7 +3,6 @@
 use tombolo_deform::communicator::{Reader, Writer, agree};
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::mesh::Vector;
-use tombolo_deform::names::nearest;
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{add, length, mean, polygon_normal, scale, subtract};
 
@@ -11,7 +10,7 @@ use super::merge::merged;
 use super::pattern::Input;
 use super::probe::points;
 use super::source::Source;
-use super::{Extract, ExtractError};
+use super::{Extract, ExtractError, unknown_feature};
 use crate::language::{ProbeAt, SeedFeatures, SeedPlane, Seeds};
 
 /// How far inside of the mesh seeds of features lie, as part of the size of a face.
@@ -83,14 +82,8 @@ fn spread(
     features: &SeedFeatures,
 ) -> Result<Vec<Vector>, String> {
     let Some(known) = &surface.features else { return Err("the surface has no features".into()) };
-    for name in &features.names {
-        if !known.names.contains(name) {
-            let names = known.names.iter().map(String::as_str);
-            let hint = nearest(name, names)
-                .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-            let names = known.names.join(", ");
-            return Err(format!("there is no feature `{name}`; there are {names}{hint}"));
-        }
+    if let Some(name) = features.names.iter().find(|&name| !known.names.contains(name)) {
+        return Err(unknown_feature(name, &known.names));
     }
     let is_in = |face: &usize| {
         let feature = known.of_cells[*face] as usize;

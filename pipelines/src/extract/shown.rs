@@ -70,7 +70,7 @@ pub(crate) fn shown(
             }
             let (extract, points) = seen(&piece.extract, |_| outside)?;
             let shared = match points {
-                Some(points) => shared(whole, piece, points.into_iter()),
+                Some(points) => shared(whole, piece, points.iter().map(|&point| point as usize)),
                 None => shared(whole, piece, 0..extract.points.len()),
             };
             Ok(Shown { extract, shared })
@@ -111,7 +111,7 @@ fn ghost_bits(extract: &Extract) -> Option<&Field> {
 fn seen(
     extract: &Arc<Extract>,
     outside: impl FnOnce(&Extract) -> Outside,
-) -> Result<(Arc<Extract>, Option<Vec<usize>>), DistributedError> {
+) -> Result<(Arc<Extract>, Option<Vec<u32>>), DistributedError> {
     if extract.cells.dimension() < 3 && ghost_bits(extract).is_none() {
         return Ok((Arc::clone(extract), None));
     }

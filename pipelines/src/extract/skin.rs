@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use tombolo_deform::mesh::{CellType, Cells, FaceBuffer, MeshError, lowest_four};
 
-use super::{Association, Extract, ExtractFeatures, Field};
+use super::Extract;
 
 /// The faces that only one cell of the extract has, and its cells of lower dimension, with their
 /// fields; `None` where there is no volume cell. Element fields are those of the cell behind.
@@ -58,23 +58,25 @@ impl Outside {
     }
 
     /// The faces, and cells of lower dimension, as an extract; and which of the points they have.
-    pub(super) fn taken(&self, extract: &Extract) -> Result<(Extract, Vec<usize>), MeshError> {
+    pub(super) fn taken(&self, extract: &Extract) -> Result<(Extract, Vec<u32>), MeshError> {
         let mut taken = Cells::new();
         let mut owners = Vec::new();
         let mut outer = self.faces.iter().peekable();
-        for (cell, (cell_type, vertices)) in extract.cells.iter().enumerate() {
+        for (number, (cell_type, vertices)) in (0..).zip(extract.cells.iter()) {
+            let cell = number as usize;
             let is_hidden = self.hidden.as_ref().is_some_and(|hidden| hidden[cell]);
             if cell_type.dimension() < 3 && !is_hidden {
                 taken.push(cell_type, vertices)?;
-                owners.push(cell);
+                owners.push(number);
             }
             while let Some(face) = outer.next_if(|face| face.cell == cell) {
                 let face = &self.corners[face.start..face.end];
-                taken.push(face_type(face), face)?;
-                owners.push(cell);
+                taken.push(CellType::of_polygon(face.len()), face)?;
+                owners.push(number);
             }
         }
-        Ok(with_cells(extract, &taken, &owners))
+        let (cells, points) = taken.compact(extract.points.len());
+        Ok((extract.part(&points, cells.into(), &owners), points))
     }
 }
 
@@ -116,14 +118,6 @@ struct Face {
     end: usize,
 }
 
-fn face_type(face: &[u32]) -> CellType {
-    match face.len() {
-        3 => CellType::Triangle,
-        4 => CellType::Quad,
-        _ => CellType::Polygon,
-    }
-}
-
 /// Takes out quadrilaterals, with the two triangles that fill each of them.
 fn remove_split(outer: &mut Vec<Face>, corners: &[u32]) {
     let triangles: HashSet<[u32; 4]> =
@@ -139,49 +133,6 @@ fn remove_split(outer: &mut Vec<Face>, corners: &[u32]) {
         }
     }
     outer.retain(|face| !inner.contains(&face.key));
-}
-
-/// An extract of other cells, with the points that they have, and which those are.
-fn with_cells(extract: &Extract, cells: &Cells, owners: &[usize]) -> (Extract, Vec<usize>) {
-    let mut numbers = vec![u32::MAX; extract.points.len()];
-    let mut points: Vec<usize> = Vec::new();
-    for &point in cells.connectivity() {
-        if numbers[point as usize] == u32::MAX {
-            numbers[point as usize] = 0;
-            points.push(point as usize);
-        }
-    }
-    points.sort_unstable();
-    (0..).zip(&points).for_each(|(number, &point)| numbers[point] = number);
-    let field = |field: &Field| {
-        let of = |entities: &[usize]| {
-            let tuple = |&entity: &usize| {
-                &field.values[entity * field.components..(entity + 1) * field.components]
-            };
-            entities.iter().flat_map(tuple).copied().collect()
-        };
-        let values = match field.association {
-            Association::Vertex => of(&points),
-            Association::Element => of(owners),
-            Association::Mesh => field.values.clone(),
-        };
-        Field { values, ..field.clone() }
-    };
-    let features = extract.features.as_ref().map(|features| {
-        let of_cells = owners.iter().map(|&cell| features.of_cells[cell]).collect();
-        ExtractFeatures { names: features.names.clone(), of_cells }.into()
-    });
-    let taken = Extract {
-        vertices: extract
-            .vertices
-            .as_ref()
-            .map(|vertices| points.iter().map(|&point| vertices[point]).collect()),
-        cells: cells.with_vertices(&numbers).into(),
-        features,
-        fields: extract.fields.iter().map(field).collect(),
-        points: points.iter().map(|&point| extract.points[point]).collect(),
-    };
-    (taken, points)
 }
 
 #[cfg(test)]

@@ -11,7 +11,9 @@ use tombolo_deform::surface::{Surface, SurfaceError};
 use super::blocks::Blocks;
 use super::gather::{self, Owners, Points};
 use super::layout::Layout;
+use super::pattern::Input;
 use super::positions::Positions;
+use super::search::Search;
 use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD};
 use tombolo_deform::communicator::{Communicator, agree};
 use tombolo_deform::distributed::{DistributedError, Part, PartBoundary};
@@ -120,6 +122,8 @@ pub struct Source {
     pub(super) boundary: Option<Boundary>,
     /// The blocks of the cells, once something was cut.
     blocks: OnceLock<Blocks>,
+    /// Its cells as they lie now, once points were looked for in them at a step.
+    search: OnceLock<Arc<Search>>,
     /// Where the vertices were when something was last cut.
     pub(super) positions: Positions,
     /// The knowledge that sets own cells apart from others: on several ranks, and where there are
@@ -248,16 +252,9 @@ impl Whole {
             .map(|cell| cell as u32)
             .collect();
         let taken = cells.subset(owners.iter().map(|&cell| cell as usize));
-        // Vertices of copies alone, and what no cell has, are somebody else's.
-        let mut numbers = vec![u32::MAX; channel.mesh.points.len()];
-        taken.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
-        let vertices: Vec<u32> = (0..)
-            .zip(&numbers)
-            .filter(|(_, number)| **number == 0)
-            .map(|(vertex, _)| vertex)
-            .collect();
-        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
-        let taken = taken.with_vertices(&numbers);
+        // Vertices of copies alone are somebody else's; those of no cell, as those that finer grids
+        // cover, are not matched between the ranks, and nobody's.
+        let (taken, vertices) = taken.compact(channel.mesh.points.len());
         let points = gather::points(&channel.mesh.points, &vertices, cycle)?;
         let from = Points::Vertices(&vertices);
         let (mut fields, errors) =
@@ -381,6 +378,7 @@ impl Source {
             right_handed,
             boundary: None,
             blocks: OnceLock::new(),
+            search: OnceLock::new(),
             positions: Positions::default(),
             whole,
             is_part,
@@ -415,6 +413,29 @@ impl Source {
     /// The blocks of the cells.
     pub(super) fn blocks(&self) -> &Blocks {
         self.blocks.get_or_init(|| Blocks::new(&self.cells, self.key.points))
+    }
+
+    /// The tree in which points are looked for, kept until the mesh moves.
+    pub(super) fn search(&self) -> &Arc<Search> {
+        self.search.get_or_init(|| Arc::new(Search::new(self)))
+    }
+
+    /// That tree, where it was made already.
+    pub(super) fn kept_search(&self) -> Option<Arc<Search>> {
+        self.search.get().cloned()
+    }
+
+    /// Takes note of where the vertices are now.
+    ///
+    /// # Errors
+    /// [`ExtractError::PointNotFinite`]; there are no points then.
+    pub(crate) fn update(&mut self, input: &Input) -> Result<(), ExtractError> {
+        let before = self.positions.version;
+        let updated = self.positions.update(&input.channel.mesh.points, input.cycle);
+        if self.positions.version != before {
+            self.search = OnceLock::new();
+        }
+        updated
     }
 
     /// The cells, as the solver has them.

@@ -21,8 +21,8 @@ pub struct FieldStatistics {
     pub first_non_finite: Option<(usize, f64)>,
 }
 
-/// How many tuples are added up before their sum is: the sums lose less to rounding.
-const CHUNK: usize = 4096;
+/// How many tuples or cells are added up before their sum is: the sums lose less to rounding.
+pub(crate) const CHUNK: usize = 4096;
 
 /// The statistics of a field over the vertices or cells of all ranks for which `counts` holds.
 /// Collective.
@@ -38,16 +38,10 @@ pub fn statistics(
     let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
     let (mut sum, mut scaled_squares, mut count, mut non_finite) = (0.0, 0.0, 0.0_f64, 0.0_f64);
     let mut first_non_finite = None;
-    let measure = |tuple: usize| match values.components() {
-        1 => values.get(tuple, 0),
-        components => {
-            (0..components).fold(0.0_f64, |sum, component| sum.hypot(values.get(tuple, component)))
-        }
-    };
     // The squares of large values would overflow: they are taken of the values over the largest.
     let mut scale = 0.0_f64;
     for tuple in (0..values.len()).filter(|&tuple| counts(tuple)) {
-        let value = measure(tuple);
+        let value = values.magnitude(tuple);
         if value.is_finite() {
             scale = scale.max(value.abs());
         }
@@ -58,7 +52,7 @@ pub fn statistics(
     for start in (0..values.len()).step_by(CHUNK) {
         let (mut part_sum, mut part_squares) = (0.0, 0.0);
         for tuple in (start..values.len().min(start + CHUNK)).filter(|&tuple| counts(tuple)) {
-            let value = measure(tuple);
+            let value = values.magnitude(tuple);
             if (0..values.components()).any(|component| is_absent(values.get(tuple, component))) {
                 continue;
             }

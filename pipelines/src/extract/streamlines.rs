@@ -16,12 +16,12 @@ use tombolo_deform::mesh::{Cells, Vector};
 use tombolo_deform::vector::{distance, length};
 
 use super::ExtractError;
-use super::gather::Rows;
+use super::gather::{Rows, weighted};
 use super::layout::Layout;
 use super::pattern::{Base, Input, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
-use crate::language::{Direction, ProbeMethod, Streamlines};
+use crate::language::{Direction, Streamlines};
 use crate::limits::Limit;
 
 /// The weights of the slopes at each stage; the last are those of the result.
@@ -177,6 +177,10 @@ impl Line {
         reached: &mut Vec<Reached>,
     ) -> Option<()> {
         let slope = slope.map(|part| self.sign() * part);
+        if self.stage > 0 && !slope.iter().all(|part| part.is_finite()) {
+            // Where the field is absent, as where there is no cell.
+            return self.halve().then_some(());
+        }
         let ahead = self.ahead();
         self.slopes[self.stage] = slope;
         if self.stage == 0 {
@@ -394,15 +398,8 @@ pub(super) fn pattern(
         least_speed: 1e-12 * fastest[0],
         points: limit,
     };
-    let finder = Finder::new(source, ProbeMethod::Interpolated);
-    let field = |found: &Found| {
-        let mut sum = [0.0; 3];
-        for &(vertex, weight) in &found.row {
-            let vector = vectors[vertex as usize];
-            (0..3).for_each(|axis| sum[axis] += weight * vector[axis]);
-        }
-        sum
-    };
+    let finder = Finder::kept(source);
+    let field = |found: &Found| weighted(&found.row, vectors);
     #[expect(clippy::cast_possible_truncation, reason = "a limited number of seeds")]
     let of_seed = |seed: usize| {
         let (forward, backward) = (2 * seed as u32, 2 * seed as u32 + 1);
@@ -524,6 +521,40 @@ mod tests {
         let limit = Limit { most, ..LINE_POINTS };
         let (pattern, _) = pattern(&source, &input, &vectors, &seeds, &stage, limit)?;
         Ok(pattern.points.len())
+    }
+
+    /// A field may be absent in a part of the mesh.
+    #[test]
+    fn lines_end_where_the_field_does() {
+        let mesh = box_of_tets([8, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
+        let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let channel = Channel::new("fluid", part.view(), &[]);
+        let mut source = Source::new(&channel).unwrap();
+        let input = Input { channel: &channel, cycle: 0, wanted: &|_| false, communicator: &Solo };
+        source.update(&input).unwrap();
+        let finder = Finder::kept(&source);
+        // Keys are asked for of the cells that a point may lie in.
+        assert!(finder.find([f64::NAN; 3], &|cell| panic!("cell {cell}")).is_none());
+        let field = |found: &Found| {
+            let is_there = |&(vertex, _): &(u32, f64)| part.points[vertex as usize][0] <= 1.0;
+            let is_there = found.row.iter().all(is_there);
+            [if is_there { 1.0 } else { f64::NAN }, 0.0, 0.0]
+        };
+        let ground = Ground { finder: &finder, key: &u64::from, field: &field };
+        let seeds = [[0.3, 0.41, 0.37], [0.1, 0.83, 0.22]];
+        let settings = Settings {
+            max_length: 10.0,
+            max_steps: 1000,
+            error: 1e-6,
+            least_speed: 1e-12,
+            points: LINE_POINTS,
+        };
+        let reached = follow(&Solo, &ground, &seeds, &[0, 2], &settings).unwrap();
+        for line in [0, 2] {
+            let ends = reached.iter().filter(|it| it.line == line).map(|it| it.point[0]);
+            let end = ends.fold(0.0, f64::max);
+            assert!((0.99..=1.0).contains(&end), "{end}");
+        }
     }
 
     #[test]

@@ -168,13 +168,7 @@ impl Source {
         input: &Input,
         stage: &Streamlines,
     ) -> Result<Extracted, ExtractError> {
-        let communicator = input.communicator;
-        let found = self.update(input).and_then(|()| self.vectors(input, &stage.field));
-        let all_have = !communicator.any(found.is_err());
-        let vectors = found?;
-        if !all_have {
-            return Err(ExtractError::Elsewhere);
-        }
+        let vectors = self.agreed_vectors(input, Some(&stage.field))?.unwrap_or_default();
         let seeds = seeds::of(self, input, &stage.seeds)?;
         let (pattern, times) =
             streamlines::pattern(self, input, &vectors, &seeds, stage, LINE_POINTS)?;
@@ -197,22 +191,28 @@ impl Source {
     /// # Errors
     /// As [`streamlines`](Self::streamlines).
     pub fn glyphs(&mut self, input: &Input, stage: &Glyphs) -> Result<Extracted, ExtractError> {
-        let communicator = input.communicator;
-        let found = self.update(input).and_then(|()| match &stage.field {
-            Some(name) => self.vectors(input, name).map(Some),
-            None => Ok(None),
-        });
-        let all_have = !communicator.any(found.is_err());
-        let vectors = found?;
-        if !all_have {
-            return Err(ExtractError::Elsewhere);
-        }
+        let vectors = self.agreed_vectors(input, stage.field.as_deref())?;
         let seeds = match &stage.at {
             GlyphsAt::Points(seeds) => seeds::of(self, input, seeds)?,
             _ => Vec::new(),
         };
-        let pattern = glyphs::pattern(self, communicator, vectors.as_deref(), &seeds, stage)?;
+        let pattern = glyphs::pattern(self, input, vectors.as_deref(), &seeds, stage)?;
         Ok(pattern.fill_once(input))
+    }
+
+    /// The vectors of a field where all ranks have them, and know where the vertices are now.
+    /// Collective.
+    fn agreed_vectors(
+        &mut self,
+        input: &Input,
+        field: Option<&str>,
+    ) -> Result<Option<Vec<Vector>>, ExtractError> {
+        let found = self.update(input);
+        let found = found.and_then(|()| field.map(|name| self.vectors(input, name)).transpose());
+        if input.communicator.any(found.is_err()) {
+            return Err(found.err().unwrap_or(ExtractError::Elsewhere));
+        }
+        found
     }
 
     /// The vector that a vertex field has at each vertex.
@@ -235,14 +235,6 @@ impl Source {
             )
         };
         Ok((0..view.values.len()).map(vector).collect())
-    }
-
-    /// Takes note of where the vertices are now.
-    ///
-    /// # Errors
-    /// [`ExtractError::PointNotFinite`]; there are no points then.
-    pub(crate) fn update(&mut self, input: &Input) -> Result<(), ExtractError> {
-        self.positions.update(&input.channel.mesh.points, input.cycle)
     }
 
     /// Where the vertices were when it was last taken note of.
@@ -327,17 +319,10 @@ impl Source {
     fn whole_cells(&self, owners: Vec<u32>) -> Result<Pattern, ExtractError> {
         let points = &self.positions.points;
         let cells = self.cells().subset(owners.iter().map(|&cell| cell as usize));
-        let mut numbers = vec![u32::MAX; points.len()];
-        cells.connectivity().iter().for_each(|&vertex| numbers[vertex as usize] = 0);
-        let vertices: Vec<u32> = (0..)
-            .zip(&numbers)
-            .filter(|(_, number)| **number == 0)
-            .map(|(vertex, _)| vertex)
-            .collect();
-        (0..).zip(&vertices).for_each(|(number, &vertex)| numbers[vertex as usize] = number);
+        let (cells, vertices) = cells.compact(points.len());
         Ok(Pattern {
             points: vertices.iter().map(|&vertex| points[vertex as usize]).collect(),
-            cells: Arc::new(cells.with_vertices(&numbers)),
+            cells: Arc::new(cells),
             base: Base::Vertices(vertices.into()),
             owners: owners.into(),
             origin: Origin::Vertices,
@@ -392,11 +377,7 @@ impl Source {
         }
         let mut values = Vec::with_capacity(view.values.len());
         for entity in 0..view.values.len() {
-            let value = match components {
-                1 => view.values.get(entity, 0),
-                _ => (0..components)
-                    .fold(0.0_f64, |sum, component| sum.hypot(view.values.get(entity, component))),
-            };
+            let value = view.values.magnitude(entity);
             let is_lacking = || is_absent(view.values.get(entity, 0));
             if !value.is_finite() && !is_lacking() && self.shows(view.association, entity) {
                 return Err(ExtractError::DecidingNotFinite {

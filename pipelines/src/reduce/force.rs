@@ -4,9 +4,9 @@ use tombolo_deform::communicator::Reduction;
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::{add, cross, mean, scale, subtract};
 
-use super::region::{CHUNK, Chosen, Part, Region, Wanted};
+use super::region::{Chosen, Part, Region, Wanted};
 use super::weights::Weights;
-use crate::extract::{Association, FieldView, is_absent};
+use crate::extract::{Association, CHUNK, FieldView, is_absent};
 use crate::language::{Force, Viscosity};
 
 /// The force of friction of the fluid on an area, without the density: `-viscosity (G + G^T) a` for

@@ -48,15 +48,11 @@ pub(crate) fn histogram(stage: &Histogram, region: &Region) -> (Vec<f64>, Option
 
 /// The magnitude of a value; `None` where it is absent or not finite.
 fn magnitude(field: &FieldView, entity: usize) -> Option<f64> {
-    let component = |component: usize| field.values.get(entity, component);
-    let components = field.values.components();
-    if (0..components).any(|part| is_absent(component(part))) {
+    let values = &field.values;
+    if (0..values.components()).any(|part| is_absent(values.get(entity, part))) {
         return None;
     }
-    let value = match components {
-        1 => component(0),
-        _ => (0..components).fold(0.0_f64, |sum, part| sum.hypot(component(part))),
-    };
+    let value = values.magnitude(entity);
     value.is_finite().then_some(value)
 }
 

@@ -4,9 +4,9 @@ use tombolo_deform::communicator::Reduction;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::vector::{dot, scale};
 
-use super::region::{CHUNK, Chosen, Region, Wanted};
+use super::region::{Chosen, Region, Wanted};
 use super::weights::{Weights, volume};
-use crate::extract::{Association, FieldView, is_absent};
+use crate::extract::{Association, CHUNK, FieldView, is_absent};
 use crate::language::{Integrate, Stage};
 
 /// The values of the monitors of a stage: its own, then those of its field and of its vector. They

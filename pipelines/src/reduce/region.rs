@@ -4,16 +4,12 @@ use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, agree};
 use tombolo_deform::mesh::{ArrayView, Cells, Values, Vector};
-use tombolo_deform::names::nearest;
 
 use crate::extract::{
     Association, Channel, Extract, ExtractFeatures, Extracted, Field, FieldView, Source,
-    check_length, is_absent, merged, unit, unknown_field,
+    check_length, is_absent, merged, unit, unknown_feature, unknown_field,
 };
 use crate::language::{Slice, Stage};
-
-/// How many cells are added up before their sum is: the sums lose less to rounding.
-pub(super) const CHUNK: usize = 4096;
 
 /// The region of an integral.
 #[derive(Clone, Copy)]
@@ -223,10 +219,4 @@ fn view_of(field: &Field) -> Result<FieldView<'_>, String> {
     let values = ArrayView::interleaved(Values::F64(&field.values), field.components);
     let values = values.map_err(|error| error.to_string())?;
     Ok(FieldView { name: &field.name, association: field.association, values })
-}
-
-fn unknown_feature(name: &str, known: &[String]) -> String {
-    let hint = nearest(name, known.iter().map(String::as_str))
-        .map_or(String::new(), |near| format!("; did you mean `{near}`?"));
-    format!("the surface has no feature `{name}`; its features are {}{hint}", known.join(", "))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use tombolo_deform::bounds::Bounds;
+use tombolo_deform::bounds::{Bounds, BoxTree};
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::surface::Surface;
 
@@ -10,64 +10,79 @@ use super::SurfaceDisplacement;
 use crate::files::Problem;
 use crate::files::error::Flaw;
 
-/// How far a point of a file may lie from its vertex, in diagonals of the surface's bounding box or
-/// in the largest coordinate, whichever is more. The nearest vertex is taken.
+/// How far a point of a file may lie from its vertex, in diagonals of the surface's bounding box;
+/// or as much as coordinates of single precision are rounded by, where that is more. The nearest
+/// vertex is taken.
 pub const TOLERANCE: f64 = 1e-6;
 
 /// Finds the surface vertices that the lines or points of a file name.
 pub(super) struct Matcher<'a> {
     surface: &'a Surface,
     tolerance: f64,
-    /// The surface vertices in each cube of twice the tolerance; made when it is first needed.
-    cubes: Option<HashMap<[i64; 3], Vec<u32>>>,
+    /// Made when they are first needed.
+    places: Option<Places>,
     taken: Vec<bool>,
     found: SurfaceDisplacement,
+}
+
+/// Where the surface vertices are.
+struct Places {
+    /// The first vertex at each place, by the bits of its coordinates.
+    exact: HashMap<[u64; 3], u32>,
+    /// All vertices, at coordinates that are scaled so that no square is infinite.
+    tree: BoxTree,
+    scale: f64,
+}
+
+impl Places {
+    fn new(surface: &Surface, largest: f64) -> Self {
+        // A power of two, which rounds nothing.
+        let scale = (-largest.log2().floor().clamp(-1000.0, 1000.0)).exp2();
+        let mut exact = HashMap::with_capacity(surface.points().len());
+        for (vertex, &point) in (0..).zip(surface.points()) {
+            exact.entry(bits(point)).or_insert(vertex);
+        }
+        let scaled = |point: &Vector| Bounds::around([point.map(|part| scale * part)]);
+        let boxes: Vec<Bounds> = surface.points().iter().map(scaled).collect();
+        Self { exact, tree: BoxTree::new(&boxes), scale }
+    }
 }
 
 impl<'a> Matcher<'a> {
     /// A matcher that has taken nothing yet.
     pub fn new(surface: &'a Surface) -> Self {
         let bounds = Bounds::around(surface.points().iter().copied());
-        let largest = bounds
-            .corners()
-            .as_flattened()
-            .iter()
-            .fold(0.0f64, |largest, value| largest.max(value.abs()));
+        let rounded = f64::from(f32::EPSILON) * largest(&bounds);
         let tolerance =
-            (TOLERANCE * bounds.diagonal().max(largest)).clamp(f64::MIN_POSITIVE, f64::MAX / 4.0);
+            (TOLERANCE * bounds.diagonal()).max(rounded).clamp(f64::MIN_POSITIVE, f64::MAX / 4.0);
         let taken = vec![false; surface.points().len()];
-        Self { surface, tolerance, cubes: None, taken, found: SurfaceDisplacement::default() }
+        Self { surface, tolerance, places: None, taken, found: SurfaceDisplacement::default() }
     }
 
-    fn cube(&self, point: Vector) -> [i64; 3] {
-        point.map(|value| (value / (2.0 * self.tolerance)).floor() as i64)
+    fn places(&mut self) -> &Places {
+        let surface = self.surface;
+        self.places.get_or_insert_with(|| {
+            let bounds = Bounds::around(surface.points().iter().copied());
+            Places::new(surface, largest(&bounds))
+        })
     }
 
-    /// The surface vertices within the tolerance of a point, with their distances.
-    pub fn near(&mut self, point: Vector) -> Vec<(f64, u32)> {
-        if self.cubes.is_none() {
-            let mut cubes: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-            for (vertex, &at) in self.surface.points().iter().enumerate() {
-                cubes.entry(self.cube(at)).or_default().push(vertex as u32);
-            }
-            self.cubes = Some(cubes);
-        }
-        let center = self.cube(point);
-        let mut near = Vec::new();
-        for offset in 0..27 {
-            let steps = [offset % 3 - 1, offset / 3 % 3 - 1, offset / 9 - 1];
-            let cube = [0, 1, 2].map(|axis| center[axis].saturating_add(steps[axis]));
-            for &vertex in
-                self.cubes.as_ref().and_then(|cubes| cubes.get(&cube)).into_iter().flatten()
-            {
-                let distance = apart(self.surface.points()[vertex as usize], point);
-                if distance <= self.tolerance && !near.contains(&(distance, vertex)) {
-                    near.push((distance, vertex));
-                }
-            }
-        }
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near
+    /// The surface vertex at a point, or nearest to it within the tolerance.
+    fn nearest(&mut self, point: Vector) -> Option<u32> {
+        let tolerance = self.tolerance;
+        let Places { exact, tree, scale } = self.places();
+        let nearest =
+            || tree.nearest(point.map(|part| scale * part), scale * tolerance).map(|it| it.0);
+        exact.get(&bits(point)).copied().or_else(nearest)
+    }
+
+    /// Whether another surface vertex lies within the tolerance of this one.
+    pub fn has_neighbour(&mut self, point: Vector) -> bool {
+        let tolerance = self.tolerance;
+        let Places { tree, scale, .. } = self.places();
+        let mut count = 0;
+        tree.around(point.map(|part| scale * part), scale * tolerance, |_| count += 1);
+        count > 1
     }
 
     /// Takes the displacement of a vertex, named by its number, by its point, or by both.
@@ -95,8 +110,8 @@ impl<'a> Matcher<'a> {
                 }
                 local
             }
-            (None, Some(point)) => match self.near(point).first() {
-                Some(&(_, local)) => local as usize,
+            (None, Some(point)) => match self.nearest(point) {
+                Some(local) => local as usize,
                 None => {
                     let points = self.surface.points().iter();
                     let nearest = points.map(|at| apart(*at, point)).fold(f64::INFINITY, f64::min);
@@ -129,6 +144,16 @@ impl<'a> Matcher<'a> {
         }
         Ok(self.found)
     }
+}
+
+/// The largest coordinate of a box.
+fn largest(bounds: &Bounds) -> f64 {
+    bounds.corners().as_flattened().iter().fold(0.0, |largest, value| value.abs().max(largest))
+}
+
+/// A place by its bits; 0 has no sign.
+fn bits(point: Vector) -> [u64; 3] {
+    point.map(|part| (part + 0.0).to_bits())
 }
 
 /// The distance between two points, without overflow on the way to it.

@@ -174,10 +174,10 @@ fn column(word: &str) -> Column {
 }
 
 /// Writes displacements as a text: by coordinates, which other programs understand too, or by
-/// vertex numbers where two vertices have the same coordinates.
+/// vertex numbers where two vertices cannot be told apart by them.
 pub(super) fn to_text(surface: &Surface, displacement: &[Vector], comma: &str) -> String {
     let mut matcher = Matcher::new(surface);
-    let alone = surface.points().iter().all(|&point| matcher.near(point).len() == 1);
+    let alone = surface.points().iter().all(|&point| !matcher.has_neighbour(point));
     let mut text =
         String::from("# displacement of the vertices of a surface, from the reference mesh\n");
     let names: &[&str] =

@@ -98,6 +98,38 @@ fn a_volume_and_a_surface_in_single_precision_are_matched_by_coordinates() {
     assert!(error.contains("a point array `displacement` of 3 components"), "{error}");
 }
 
+/// In geographic coordinates all vertices of a small body lie within what single precision rounds.
+#[test]
+fn a_small_body_far_from_the_origin_is_matched_by_its_nearest_vertices() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = torus(5.0, 1.5, [100, 80]);
+    let moved = mesh.points().iter().map(|&[x, y, z]| [x + 5e6, y + 5e6, z]).collect();
+    let mesh = mesh.with_points(moved).unwrap();
+    let surface = Surface::extract(&mesh, &FeatureSettings::default()).unwrap();
+    let values: Vec<Vector> = surface.points().iter().map(|&[x, y, z]| [z, x - y, 1.0]).collect();
+    let file = folder.path().join("a.txt");
+    write_displacement(&file, &surface, &values).unwrap();
+    assert_eq!(read_displacement(&file, &surface).unwrap().values, values);
+    // By coordinates, to the bit and to a centimetre.
+    for digits in [20, 2] {
+        let mut text = String::new();
+        for ([x, y, z], [a, b, c]) in surface.points().iter().zip(&values) {
+            text += &format!("{x:.digits$} {y:.digits$} {z:.digits$} {a:?} {b:?} {c:?}\n");
+        }
+        let found = parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface).unwrap();
+        assert_eq!((found.vertices.as_slice(), &found.values), (surface.vertices(), &values));
+    }
+    // Other vertices are neither near nor meant.
+    let [x, y, z] = surface.points()[0];
+    let number = surface.vertices()[0];
+    for text in [
+        format!("{} {y} {z} 0 0 0", x + 2.0),
+        format!("vertex x y z dx dy dz\n{number} {} {y} {z} 0 0 0", x + 2.0),
+    ] {
+        assert!(parse_displacement(Path::new("a.txt"), text.as_bytes(), &surface).is_err());
+    }
+}
+
 #[test]
 fn text_is_read_in_all_its_forms() {
     let surface = surface();

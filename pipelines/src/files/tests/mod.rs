@@ -58,11 +58,7 @@ fn one_of_some(dimension: usize, is_chosen: impl Fn(CellType) -> bool) -> Mesh {
             let mut tags = Vec::new();
             for cell in 0..cells.len() {
                 cells.for_each_face(cell, |face| {
-                    let kind = match face.len() {
-                        3 => CellType::Triangle,
-                        4 => CellType::Quad,
-                        _ => CellType::Polygon,
-                    };
+                    let kind = CellType::of_polygon(face.len());
                     faces.push(kind, face).unwrap();
                     tags.push(if cell % 2 == 0 { 17 } else { 4 });
                 });

@@ -144,6 +144,38 @@ fn names_as_text_are_read() {
     );
 }
 
+/// Each piece has its own arrays, and is not looked for among those of all.
+#[test]
+fn many_pieces_are_read_in_the_time_of_one() {
+    let piece = |offset: usize| {
+        format!(
+            "<Piece NumberOfPoints=\"3\" NumberOfCells=\"1\"><PointData><DataArray type=\"Float64\" Name=\"p\">{offset} 0 1</DataArray>\
+             </PointData><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">{offset} 0 0 {offset} 1 0 {offset} 0 1</DataArray></Points>\
+             <Cells><DataArray type=\"Int64\" Name=\"connectivity\">0 1 2</DataArray><DataArray type=\"Int64\" \
+             Name=\"offsets\">3</DataArray><DataArray type=\"UInt8\" Name=\"types\">5</DataArray></Cells></Piece>"
+        )
+    };
+    let file = |parts: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\"><UnstructuredGrid>{parts}</UnstructuredGrid></VTKFile>"
+        )
+    };
+    let field_data = "<FieldData><DataArray type=\"Float64\" Name=\"q\">7</DataArray></FieldData>";
+    let parts: String = (0..3).map(piece).collect();
+    let (_, p) = values("a.vtu", file(&(parts + field_data)).as_bytes(), "p");
+    assert_eq!(p, [0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 2.0, 0.0, 1.0]);
+
+    let empty = "<Piece></Piece>".repeat(100_000);
+    let arrays = "<PointData><DataArray type=\"Int64\" Name=\"a\"/></PointData>".repeat(100_000);
+    let parts = format!("{empty}<Piece>{arrays}</Piece>");
+    // What comes of it does not matter, but that it comes.
+    let _ = parse_mesh(Path::new("a.vtu"), file(&parts).as_bytes());
+    let _ = parse_mesh(
+        Path::new("a.vtu"),
+        file(&format!("<Piece>{arrays}</Piece>").repeat(2)).as_bytes(),
+    );
+}
+
 #[test]
 fn refusals_name_the_file_and_what_to_do() {
     let folder = tempfile::tempdir().unwrap();

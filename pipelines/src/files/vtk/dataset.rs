@@ -1,6 +1,6 @@
 //! From the arrays of a VTK file to a mesh.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 #[cfg(feature = "vtkio")]
 use std::sync::Arc;
 
@@ -185,10 +185,11 @@ impl Dataset {
 }
 
 fn append_arrays(first: &mut Vec<Array>, second: Vec<Array>, notes: &mut Vec<String>) {
+    // Of several of one name the first, and so the last that is put in.
+    let others = second.iter().rev().map(|other| ((&*other.name, other.components), other));
+    let others: HashMap<(&str, usize), &Array> = others.collect();
     first.retain_mut(|array| {
-        let other = second
-            .iter()
-            .find(|other| other.name == array.name && other.components == array.components);
+        let other = others.get(&(&*array.name, array.components));
         match (&mut array.numbers, other.map(|other| &other.numbers)) {
             (Numbers::Float(values), Some(Numbers::Float(more))) => values.extend(more),
             (Numbers::Integer(values), Some(Numbers::Integer(more))) => values.extend(more),

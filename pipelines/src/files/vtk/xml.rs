@@ -3,6 +3,8 @@
 //! Text, inline base64 and appended data (raw or base64), either byte order, 32- and 64-bit
 //! headers, plain or compressed with zlib or LZ4.
 
+use std::ops::Range;
+
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use tombolo_deform::mesh::{Cells, NumberType};
@@ -59,6 +61,8 @@ enum Form<'a> {
 struct XmlPiece {
     point_count: usize,
     cell_count: Option<usize>,
+    /// Those of the document's elements among which its own are: the next piece begins behind them.
+    elements: Range<usize>,
 }
 
 struct Document<'a> {
@@ -181,6 +185,7 @@ impl<'a> Document<'a> {
             "Piece" => self.pieces.push(XmlPiece {
                 point_count: count(element, "NumberOfPoints")?.unwrap_or(0),
                 cell_count: count(element, "NumberOfCells")?,
+                elements: self.elements.len()..self.elements.len(),
             }),
             "DataArray" | "Array" => {
                 let in_piece = open.iter().any(|name| name == "Piece");
@@ -206,6 +211,9 @@ impl<'a> Document<'a> {
                     form,
                     position,
                 });
+                if let Some(piece) = self.pieces.last_mut() {
+                    piece.elements.end = self.elements.len();
+                }
             }
             _ => {}
         }
@@ -254,11 +262,20 @@ impl<'a> Document<'a> {
         section: &str,
         tuples: Option<usize>,
     ) -> Result<Vec<Array>, Flaw> {
-        self.elements
-            .iter()
-            .filter(|element| element.piece == piece && element.section == section)
+        self.elements_of(piece)
+            .filter(|element| element.section == section)
             .map(|element| self.array(element, tuples))
             .collect()
+    }
+
+    /// The array elements of a piece, or those of none.
+    fn elements_of(&self, piece: Option<usize>) -> impl Iterator<Item = &Element<'a>> {
+        let range = match piece {
+            Some(index) => self.pieces.get(index).map_or(0..0, |piece| piece.elements.clone()),
+            None => 0..self.elements.len(),
+        };
+        let elements = self.elements.get(range).unwrap_or_default();
+        elements.iter().filter(move |element| element.piece == piece)
     }
 
     fn array(&self, element: &Element, tuples: Option<usize>) -> Result<Array, Flaw> {
@@ -369,11 +386,9 @@ impl<'a> Document<'a> {
     /// An array of integers; nothing where there is none.
     fn integers(&self, piece: usize, section: &str, name: &str) -> Result<Vec<i64>, Flaw> {
         let of_name = |element: &&Element| {
-            element.piece == Some(piece)
-                && element.section == section
-                && element.name.eq_ignore_ascii_case(name)
+            element.section == section && element.name.eq_ignore_ascii_case(name)
         };
-        match self.elements.iter().find(of_name) {
+        match self.elements_of(Some(piece)).find(of_name) {
             Some(element) => {
                 Ok(self.array(element, None)?.integers().map_err(at(element.position))?)
             }
