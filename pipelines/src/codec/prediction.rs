@@ -21,18 +21,9 @@ fn sum(nodes: &[Node], stencil: &Stencil, sums: &mut Node) {
     *sums = sum;
 }
 
-/// The sums of one point.
-// A function of its own: inlined, its lanes would be summed one by one.
-#[inline(never)]
-pub(super) fn sums(nodes: &[Node], stencil: &Stencil) -> Node {
-    let mut sums = Node::ZERO;
-    sum(nodes, stencil, &mut sums);
-    sums
-}
-
 /// The sums of points, but for those with a mask, with the nodes as they are.
 #[inline(always)]
-pub(super) fn sums_of_block(
+pub(super) fn sums_of(
     nodes: &[Node],
     stencils: &[Stencil],
     mask: Option<&[bool]>,
@@ -43,6 +34,23 @@ pub(super) fn sums_of_block(
             sum(nodes, stencil, sums);
         }
     }
+}
+
+/// The sums of the next points of a list, as many as there is room for.
+#[inline(always)]
+pub(super) fn sums_of_each<'sums>(
+    nodes: &[Node],
+    stencils: &[Stencil],
+    points: &mut impl Iterator<Item = usize>,
+    sums: &'sums mut [(usize, Node); BLOCK],
+) -> &'sums [(usize, Node)] {
+    let mut count = 0;
+    for ((to, sums), point) in sums.iter_mut().zip(points) {
+        *to = point;
+        sum(nodes, &stencils[point], sums);
+        count += 1;
+    }
+    &sums[..count]
 }
 
 /// The prediction behind the sums, in this order.
