@@ -246,6 +246,17 @@ fn a_mesh_that_moves_in_a_line_sends_it_once() {
     assert!(lost, "nothing is known of the line");
 }
 
+#[test]
+fn positions_that_stay_are_coded_again_within_a_smaller_bound() {
+    let (still, triangles) = sheet(20);
+    let coded = check(&still, &triangles, &[], 1e-6);
+    let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
+    let moved: Vec<[f64; 3]> = still.iter().map(|[x, y, z]| [x + y * y, y - z, *z]).collect();
+    let sizes = [1e-2, 1e-2, 1e-5, 1e-4]
+        .map(|bound| motion_frame([&mut motion, &mut copy], &coded, &moved, bound, 0).len());
+    assert!(sizes[0] > 1 && sizes[1] == 1 && sizes[2] > 1 && sizes[3] == 1, "{sizes:?}");
+}
+
 /// Where the bound is near the rounding of the coordinates, or below that of the displacement.
 #[test]
 fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
