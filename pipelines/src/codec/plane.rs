@@ -18,9 +18,6 @@ const FIRST_TABLES: [u8; CLASSES] =
     [2, 7, 9, 10, 11, 11, 12, 14, 15, 16, 18, 19, 20, 21, 23, 25, 28];
 /// No difference is larger: in single precision all of them are exact.
 const MOST_STEPS: f64 = 16_777_216.0;
-/// From so many points on, one of so many is asked which way of prediction is best: it takes less
-/// time, and costs two bits in a hundred.
-const SAMPLED: [usize; 2] = [1 << 16, 3];
 /// The bits that another table costs.
 const TABLE_PRICE: f32 = 9.0;
 
@@ -154,7 +151,12 @@ impl Plane {
             Some(ways) => ways.modes(points),
             None => Modes::uniform(SPACE),
         };
-        let stride = if points < SAMPLED[0] { 1 } else { SAMPLED[1] };
+        // Some say nearly as well which way of prediction is best.
+        let stride = match points {
+            0..4096 => 1,
+            4096..65536 => 2,
+            _ => 3,
+        };
         let mut by = modes.coefficients(SPACE);
         let (mut known, mut current) = ([Node::ZERO; BLOCK], Run::new(around.mask.is_some()));
         let mut scratch = Scratch::NEW;

@@ -6,8 +6,8 @@ use super::hierarchy::{BLOCK, Stencil};
 use super::node::Node;
 use super::prediction::{Coefficients, sums_of_each};
 
-/// The coefficients are fitted to about so many points: they say as much as all.
-const FITTED_TO: usize = 16384;
+/// The coefficients are fitted to about so many points: they say nearly as much as all.
+const FITTED_TO: usize = 4096;
 /// Neighbours alone.
 pub(super) const SPACE: u8 = 0;
 /// The ways that are fixed: neighbours alone; the last frame alone; the last frame and how the
