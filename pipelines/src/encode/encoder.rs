@@ -194,7 +194,7 @@ fn bound(error: ErrorBound, extent: f64) -> Bound {
 /// The widest range of any component over the values that are finite.
 fn extent(field: &extract::Field) -> f64 {
     let ranges = codec::ranges(&field.values, field.components);
-    ranges.into_iter().fold(0.0, |widest, [least, largest]| widest.max(largest - least))
+    ranges.into_iter().fold(0.0_f64, |widest, [least, largest]| widest.max(largest - least))
 }
 
 /// A topology that was coded.
