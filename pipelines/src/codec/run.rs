@@ -1,5 +1,6 @@
 //! A run of points, of which none is predicted from another: what is known of them, number by number,
 //! so that a processor works on several at once.
+#![expect(clippy::needless_range_loop, reason = "loops over lists side by side, which vectorise")]
 
 use std::ops::Range;
 
