@@ -246,6 +246,17 @@ fn a_mesh_that_moves_in_a_line_sends_it_once() {
     assert!(lost, "nothing is known of the line");
 }
 
+#[test]
+fn positions_that_stay_are_coded_again_within_a_smaller_bound() {
+    let (still, triangles) = sheet(20);
+    let coded = check(&still, &triangles, &[], 1e-6);
+    let [mut motion, mut copy] = [Motion::new(&coded.topology), Motion::new(&coded.topology)];
+    let moved: Vec<[f64; 3]> = still.iter().map(|[x, y, z]| [x + y * y, y - z, *z]).collect();
+    let sizes = [1e-2, 1e-2, 1e-5, 1e-4]
+        .map(|bound| motion_frame([&mut motion, &mut copy], &coded, &moved, bound, 0).len());
+    assert!(sizes[0] > 1 && sizes[1] == 1 && sizes[2] > 1 && sizes[3] == 1, "{sizes:?}");
+}
+
 /// Where the bound is near the rounding of the coordinates, or below that of the displacement.
 #[test]
 fn a_mesh_that_moves_freely_stays_within_a_bound_near_rounding() {
@@ -287,10 +298,78 @@ fn the_same_input_gives_the_same_bytes() {
     let bytes = once();
     assert_eq!(bytes, once());
     // What the bytes are on one machine they are on any other, WebAssembly among them.
-    let sum = bytes.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    });
+    let sum = sum_of(&bytes);
     assert_eq!((bytes.len(), sum), (1137, 0xc2a3_a087_5651_ad05), "{sum:016x}");
+}
+
+/// The sum of bytes by which two programs that write different ones are told apart.
+fn sum_of(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325u64, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+#[test]
+fn frames_of_all_kinds_have_the_bytes_that_they_always_had() {
+    /// The bytes of a series: how many, and their sum.
+    const STORED: [(usize, u64); 9] = [
+        (1230, 0xb9f2_4fe3_2d6e_dcd5),
+        (1003, 0xfdbf_c918_f61a_4caa),
+        (23_322, 0xb565_38c5_b42b_c7c9),
+        (30_147, 0xff06_7f7f_5199_7eb1),
+        (3480, 0xe1dc_4a4b_c289_7335),
+        (99_314, 0xf89b_fba6_307c_42d5),
+        (49_950, 0x36a5_1f8c_39cc_7620),
+        (156_574, 0x86fe_9725_e310_4cb9),
+        (32_481, 0x4e17_dacc_03a1_60ac),
+    ];
+    // Neither sines nor roots: every machine has the same values.
+    let wave = |x: f64, frame: f64| {
+        let x = (3.0 * x + 0.05 * frame).rem_euclid(2.0) - 1.0;
+        x * (1.0 - x.abs())
+    };
+    let noise = |index: usize| ((index * 7919 + index * index % 613) % 1000) as f64 / 1000.0 - 0.5;
+    let value = |kind: usize, at: [f64; 3], index: usize, frame: f64| match kind {
+        // Smooth, noisy, mostly zero, and with values that no step reaches.
+        0 => wave(at[0] + at[1] * at[1], frame),
+        1 => wave(at[0] * at[1], frame) + 0.1 * noise(index + 3 * frame as usize),
+        2 if at[0] < 0.8 => 0.0,
+        2 => wave(at[0] + at[1], frame),
+        _ if index % 97 == 5 => [f64::NAN, f64::INFINITY, 1e300][index % 3],
+        _ => 40.0 * wave(at[1], frame) + noise(index),
+    };
+    let series = [
+        // Points to a side, components, kind, bound; a side of 260 has eight lanes.
+        (30, 1, 0, 1e-3),
+        (80, 1, 0, 1e-2),
+        (80, 1, 1, 1e-4),
+        (80, 2, 1, 1e-3),
+        (80, 3, 2, 1e-3),
+        (50, 2, 3, 1e-2),
+        (50, 1, 1, 1e-9),
+        (260, 1, 1, 1e-3),
+        (260, 3, 2, 1e-4),
+    ];
+    let mut found = Vec::new();
+    for (side, components, kind, bound) in series {
+        let (points, triangles) = sheet(side);
+        let coded = Topology::encode(&points, &triangles, None, &[], 1e-5).unwrap();
+        let mut fields = [Field::new(components), Field::new(components)];
+        let mut bytes = Vec::new();
+        for frame in 0..3 {
+            let values: Vec<f64> = (0..points.len() * components)
+                .map(|index| {
+                    let (x, y) =
+                        (index / components % side as usize, index / components / side as usize);
+                    let at = [x as f64, y as f64, 0.0].map(|x| x / f64::from(side));
+                    value(kind, at, index, f64::from(frame) + 10.0 * (index % components) as f64)
+                })
+                .collect();
+            bytes.extend(exchange(&mut fields, &coded, &values, Bound::Absolute(bound)).0);
+        }
+        found.push((bytes.len(), sum_of(&bytes)));
+    }
+    assert_eq!(found, STORED, "{found:#x?}");
 }
 
 /// Values of all kinds.

@@ -94,8 +94,11 @@ pub(super) fn unzigzag(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
+/// The most zeros at the end that a writer leaves out.
+const LEFT_OUT: usize = 5;
+
 /// Writes decisions.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Writer {
     low: u64,
     range: u32,
@@ -134,7 +137,7 @@ impl Writer {
         }
     }
 
-    /// All bytes; zeros at the end are left out.
+    /// All bytes; zeros at the end are left out, up to five.
     pub(super) fn finish(mut self) -> Vec<u8> {
         // Any number of the last range will do: the one with the most zeros at its end.
         let end = self.low + u64::from(self.range) - 1;
@@ -148,8 +151,8 @@ impl Writer {
         for _ in 0..5 {
             self.shift();
         }
-        while self.bytes.last() == Some(&0) {
-            self.bytes.pop();
+        for _ in 0..LEFT_OUT {
+            self.bytes.pop_if(|byte| *byte == 0);
         }
         self.bytes
     }
@@ -209,8 +212,7 @@ impl<'bytes> Reader<'bytes> {
         while self.range < NARROW {
             self.range <<= 8;
             self.code = self.code << 8 | u32::from(self.next());
-            // The five that the writer may have left out.
-            if self.at > self.bytes.len() + 5 {
+            if self.at > self.bytes.len() + LEFT_OUT {
                 return Err(CodecError::Truncated);
             }
         }
@@ -280,6 +282,20 @@ mod tests {
             let written = all(&mut writer, count);
             let bytes = writer.finish();
             assert_eq!(all(&mut Reader::new(&bytes), count), written);
+        }
+    }
+
+    #[test]
+    fn many_zeros_at_the_end_are_read() {
+        let mut writer = Writer::new();
+        let values = [u64::MAX, 0, 0, 0, 1 << 63, 0, 0, 0];
+        for (last, &value) in values.iter().enumerate() {
+            writer.plain(value, 64).unwrap();
+            let bytes = writer.clone().finish();
+            let mut reader = Reader::new(&bytes);
+            for &value in &values[..=last] {
+                assert_eq!(reader.plain(0, 64), Ok(value));
+            }
         }
     }
 

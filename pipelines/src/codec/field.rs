@@ -6,7 +6,8 @@ use super::exact::{self, Precision};
 use super::grid::{Grid, MOST_STEPS};
 use super::hierarchy::Hierarchy;
 use super::mask::Mask;
-use super::plane::{Around, Wanted, two_to};
+use super::plane::{Around, Shift, Values, Wanted, two_to};
+use super::ranges::ranges;
 
 /// By how much a finite value may differ after it was coded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,6 +99,18 @@ impl Field {
         bound: Bound,
         message: &mut Vec<u8>,
     ) -> Result<(), CodecError> {
+        self.encode_frame(hierarchy, order, values, bound, message).map(|_| ())
+    }
+
+    /// Codes the next frame, and returns the values that no step reaches.
+    fn encode_frame(
+        &mut self,
+        hierarchy: &Hierarchy,
+        order: &[u32],
+        values: &[f64],
+        bound: Bound,
+        message: &mut Vec<u8>,
+    ) -> Result<Vec<(usize, f64)>, CodecError> {
         let (found, expected) = (values.len(), hierarchy.len() * self.components);
         let fits = order.len() == hierarchy.len()
             && order.iter().all(|&tuple| (tuple as usize) < hierarchy.len());
@@ -113,19 +126,43 @@ impl Field {
             if first.is_empty() {
                 message.extend([0; 8].repeat(self.components));
             }
-            return Ok(());
+            return Ok(Vec::new());
         }
         if let Bound::Absolute(bound) = bound
-            && let Some((grid, follows)) = self.grid(hierarchy.len(), values, bound)
+            && let Some((grid, shift)) = self.grid(hierarchy.len(), values, bound)
         {
-            return self.encode_grid(grid, follows, hierarchy, order, values, bound, message);
+            return self.encode_grid(grid, shift, hierarchy, order, values, bound, message);
         }
-        self.encode_exact(hierarchy, order, values, message)
+        self.encode_exact(hierarchy, order, values, message)?;
+        Ok(Vec::new())
     }
 
-    /// The grid for the next frame, and whether it goes on from the last. `None` where no grid has
-    /// steps small enough.
-    fn grid(&mut self, points: usize, values: &[f64], bound: f64) -> Option<(Grid, bool)> {
+    /// Codes the next frame as [`Field::encode`] does, and returns what [`Field::decode`] will.
+    pub(super) fn encode_and_show(
+        &mut self,
+        hierarchy: &Hierarchy,
+        order: &[u32],
+        values: &[f64],
+        bound: Bound,
+        message: &mut Vec<u8>,
+    ) -> Result<Vec<f64>, CodecError> {
+        let exceptions = self.encode_frame(hierarchy, order, values, bound, message)?;
+        let Known::Grid(grid) = &self.known else {
+            // Nothing is lost.
+            return Ok(order
+                .iter()
+                .flat_map(|&tuple| &values[tuple as usize * self.components..][..self.components])
+                .copied()
+                .collect());
+        };
+        let mut shown = grid.values();
+        exceptions.into_iter().for_each(|(place, value)| shown[place] = value);
+        Ok(shown)
+    }
+
+    /// The grid for the next frame, and how the last one is shifted if it goes on. `None` where no
+    /// grid has steps small enough.
+    fn grid(&mut self, points: usize, values: &[f64], bound: f64) -> Option<(Grid, Option<Shift>)> {
         let mut offsets = Vec::with_capacity(self.components);
         let mut span = 0.0_f64;
         for (component, [least, largest]) in ranges(values, self.components).into_iter().enumerate()
@@ -169,27 +206,27 @@ impl Field {
         #[expect(clippy::cast_possible_truncation, reason = "checked above")]
         let exponent = exponent as i16;
         if let Known::Grid(mut grid) = std::mem::replace(&mut self.known, Known::Nothing)
-            && grid.follow(exponent)
+            && let Some(shift) = grid.follow(exponent)
         {
             grid.steps = steps;
-            return Some((grid, true));
+            return Some((grid, Some(shift)));
         }
-        Some((Grid::new(exponent, steps, offsets, points), false))
+        Some((Grid::new(exponent, steps, offsets, points), None))
     }
 
     #[expect(clippy::too_many_arguments, reason = "those of `encode`, and its grid")]
     fn encode_grid(
         &mut self,
         mut grid: Grid,
-        follows: bool,
+        shift: Option<Shift>,
         hierarchy: &Hierarchy,
         order: &[u32],
         values: &[f64],
         bound: f64,
         message: &mut Vec<u8>,
-    ) -> Result<(), CodecError> {
+    ) -> Result<Vec<(usize, f64)>, CodecError> {
         let stencils = hierarchy.stencils();
-        let components = self.components;
+        let (components, follows) = (self.components, shift.is_some());
         let start = message.len();
         message.push(GRID | if follows { FOLLOWS } else { 0 });
         message.extend(grid.exponent.to_le_bytes());
@@ -208,30 +245,36 @@ impl Field {
             }
         }
         grid.mask = mask;
+        let ordered = in_order(values, components, order);
+        let lists = || ordered.chunks_exact(order.len().max(1));
+        let exponent = grid.exponent;
+        let wanted = |values, offset| Wanted { values, offset, exponent, bound };
+        if let Some(shift) = shift {
+            for ((plane, &offset), values) in grid.planes.iter_mut().zip(&grid.offsets).zip(lists())
+            {
+                plane.shift_to(shift, &wanted(values, offset));
+            }
+        }
         grid.set_masked();
         let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
         let mut exceptions = Vec::new();
-        let mut ordered = vec![0.0; order.len()];
-        for component in 0..components {
-            for (ordered, &tuple) in ordered.iter_mut().zip(order) {
-                *ordered = values[tuple as usize * components + component];
-            }
+        for (component, ordered) in lists().enumerate() {
             let (before, plane) = grid.planes.split_at_mut(component);
             let beside = before.last().map(|plane| &plane.nodes[..]);
-            let around = Around { hierarchy, mask, beside, step: f32::from(grid.steps) };
-            let (offset, exponent) = (grid.offsets[component], grid.exponent);
-            let wanted = Wanted { values: &ordered, offset, exponent, bound };
-            let beyond = plane[0].encode(around, follows, wanted, message);
+            let step = f32::from(grid.steps);
+            let around = Around { hierarchy, mask, beside, step, follows };
+            let wanted = wanted(ordered, grid.offsets[component]);
+            let beyond = plane[0].encode(around, wanted, message);
             let exception = |place| (place * components + component, ordered[place]);
             exceptions.extend(beyond.into_iter().map(exception));
         }
         if !exceptions.is_empty() {
             message[start] |= EXCEPTIONS;
-            put_exceptions(exceptions, message);
+            put_exceptions(&mut exceptions, message);
         }
         grid.frames = grid.frames.saturating_add(1);
         self.known = Known::Grid(grid);
-        Ok(())
+        Ok(exceptions)
     }
 
     fn encode_exact(
@@ -344,9 +387,8 @@ impl Field {
             Grid::new(exponent, steps, offsets, hierarchy.len())
         } else {
             let Known::Grid(mut grid) = known else { return Err(NOT_KNOWN) };
-            if !grid.follow(exponent) {
-                return Err(NOT_KNOWN);
-            }
+            let shift = grid.follow(exponent).ok_or(NOT_KNOWN)?;
+            grid.planes.iter_mut().for_each(|plane| plane.shift(shift));
             grid.steps = steps;
             grid
         };
@@ -359,13 +401,18 @@ impl Field {
         }
         grid.set_masked();
         let mask = grid.mask.as_ref().map(|mask| &mask.points[..]);
-        for component in 0..self.components {
+        let (components, unit) = (self.components, grid.unit());
+        let mut values = vec![0.0; hierarchy.len() * components];
+        for component in 0..components {
             let (before, plane) = grid.planes.split_at_mut(component);
             let beside = before.last().map(|plane| &plane.nodes[..]);
-            let around = Around { hierarchy, mask, beside, step: f32::from(grid.steps) };
-            plane[0].decode(around, input)?;
+            let (step, follows) = (f32::from(grid.steps), flags & FOLLOWS != 0);
+            let around = Around { hierarchy, mask, beside, step, follows };
+            let (tuples, offset) = (&mut values[..], grid.offsets[component]);
+            let values = Values { tuples, components, component, offset, unit };
+            plane[0].decode(around, input, values)?;
         }
-        let mut values = grid.values();
+        grid.put_masked(&mut values);
         if flags & EXCEPTIONS != 0 {
             take_exceptions(&mut values, input)?;
         }
@@ -375,59 +422,41 @@ impl Field {
     }
 }
 
-/// The least and the largest finite value of each component; none is larger than infinity.
-fn ranges(values: &[f64], components: usize) -> Vec<[f64; 2]> {
-    let lanes = match components {
-        1 => ranges_of::<4>(values),
-        2 => ranges_of::<8>(values),
-        3 => ranges_of::<12>(values),
-        _ => values.chunks(components).fold(vec![NO_RANGE; components], |mut ranges, tuple| {
-            ranges.iter_mut().zip(tuple).for_each(|(range, &value)| widen(range, value));
-            ranges
-        }),
-    };
-    let mut ranges = vec![NO_RANGE; components];
-    for (lane, of_lane) in lanes.into_iter().enumerate() {
-        let [least, largest] = &mut ranges[lane % components];
-        *least = least.min(of_lane[0]);
-        *largest = largest.max(of_lane[1]);
+/// The values place after place, one component after the other.
+fn in_order(values: &[f64], components: usize, order: &[u32]) -> Vec<f64> {
+    match components {
+        1 => in_order_of::<1>(values, order),
+        2 => in_order_of::<2>(values, order),
+        3 => in_order_of::<3>(values, order),
+        _ => {
+            let value = |component| move |&at: &u32| values[at as usize * components + component];
+            (0..components).flat_map(|component| order.iter().map(value(component))).collect()
+        }
     }
-    ranges
 }
 
-const NO_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
-#[inline(always)]
-fn widen([least, largest]: &mut [f64; 2], value: f64) {
-    let is_finite = value.abs() < f64::INFINITY;
-    *least = if is_finite && value < *least { value } else { *least };
-    *largest = if is_finite && value > *largest { value } else { *largest };
-}
-
-/// The ranges of so many values that stand side by side.
-fn ranges_of<const LANES: usize>(values: &[f64]) -> Vec<[f64; 2]> {
-    let (mut least, mut largest) = ([NO_RANGE[0]; LANES], [NO_RANGE[1]; LANES]);
-    let (rounds, rest) = values.as_chunks::<LANES>();
-    let mut take = |lane: usize, value: f64| {
-        let mut range = [least[lane], largest[lane]];
-        widen(&mut range, value);
-        [least[lane], largest[lane]] = range;
-    };
-    for round in rounds {
-        (0..LANES).for_each(|lane| take(lane, round[lane]));
+/// The same of tuples of so many values, each of which is looked up once.
+fn in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32]) -> Vec<f64> {
+    let mut ordered = vec![0.0; COMPONENTS * order.len()];
+    let mut lists = ordered.chunks_exact_mut(order.len().max(1));
+    let mut lists: [&mut [f64]; COMPONENTS] =
+        std::array::from_fn(|_| lists.next().unwrap_or_default());
+    let tuples = values.as_chunks::<COMPONENTS>().0;
+    for (place, &at) in order.iter().enumerate() {
+        let tuple = tuples[at as usize];
+        lists.iter_mut().zip(tuple).for_each(|(list, value)| list[place] = value);
     }
-    rest.iter().enumerate().for_each(|(lane, &value)| take(lane, value));
-    least.into_iter().zip(largest).map(|(least, largest)| [least, largest]).collect()
+    ordered
 }
 
 const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");
 
 /// Values by their place, the lowest first: each as how many lie between it and the one before.
-fn put_exceptions(mut exceptions: Vec<(usize, f64)>, message: &mut Vec<u8>) {
+fn put_exceptions(exceptions: &mut [(usize, f64)], message: &mut Vec<u8>) {
     exceptions.sort_unstable_by_key(|exception| exception.0);
     put_count(message, exceptions.len());
     let mut next = 0;
-    for (place, value) in exceptions {
+    for &mut (place, value) in exceptions {
         put_count(message, place - next);
         message.extend(value.to_le_bytes());
         next = place + 1;

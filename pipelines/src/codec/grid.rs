@@ -1,7 +1,7 @@
 //! A field in whole steps of a grid: what both sides know of it.
 
 use super::mask::Mask;
-use super::plane::{Plane, two_to};
+use super::plane::{Plane, Shift, two_to};
 
 /// No value is further than this from its offset, in grid steps.
 pub(super) const MOST_STEPS: f64 = 4_194_304.0;
@@ -24,18 +24,16 @@ impl Grid {
         Self { exponent, steps, offsets, planes, mask: None, frames: 0 }
     }
 
-    /// Makes the last frame the one before. `false` where the grids are too different.
-    pub(super) fn follow(&mut self, exponent: i16) -> bool {
+    /// Takes another exponent for the next frame. `None` where the grids are too different;
+    /// otherwise what is to become of the planes.
+    pub(super) fn follow(&mut self, exponent: i16) -> Option<Shift> {
         let by = i32::from(self.exponent) - i32::from(exponent);
         if by.abs() > 100 {
-            return false;
+            return None;
         }
-        #[expect(clippy::cast_possible_truncation, reason = "a power of two that it has")]
-        let scale = two_to(by) as f32;
-        let is_second = self.frames == 1;
-        self.planes.iter_mut().for_each(|plane| plane.shift(scale, is_second));
         self.exponent = exponent;
-        true
+        #[expect(clippy::cast_possible_truncation, reason = "a power of two that it has")]
+        Some(Shift { scale: two_to(by) as f32, is_second: self.frames == 1 })
     }
 
     /// A step of the grid.
@@ -56,6 +54,7 @@ impl Grid {
         }
     }
 
+    /// The values, but for those that no step reaches.
     pub(super) fn values(&self) -> Vec<f64> {
         let unit = self.unit();
         let (points, components) = (self.planes.first(), self.planes.len());
@@ -67,9 +66,15 @@ impl Grid {
                 *value = offset + f64::from(node.now()) * unit;
             }
         }
+        self.put_masked(&mut values);
+        values
+    }
+
+    /// Gives points with a mask their tuples.
+    pub(super) fn put_masked(&self, values: &mut [f64]) {
+        let components = self.planes.len();
         for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
             values[place * components..][..components].copy_from_slice(tuple);
         }
-        values
     }
 }

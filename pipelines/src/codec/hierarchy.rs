@@ -1,5 +1,7 @@
 //! The order of points from coarse to fine, and what each is predicted from.
 
+use std::ops::Range;
+
 use tombolo_deform::lanes::{LANES, with_wide_registers};
 
 use super::kriging::{NEIGHBOURS, Neighbours, square, weights};
@@ -22,13 +24,14 @@ pub struct Hierarchy {
     /// The point that stands at each place of the order.
     order: Vec<u32>,
     stencils: Vec<Stencil>,
-    /// For each place, whether it is predicted from one of its own block.
-    leans: Vec<bool>,
+    /// The ends of the runs.
+    runs: Vec<u32>,
 }
 
 /// The points that a value is predicted from, all earlier in the order, the nearest first, with
 /// their weights. Where there are fewer than eight the nearest stands again, with no weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
 pub(super) struct Stencil {
     pub(super) places: [u32; NEIGHBOURS],
     pub(super) weights: [f32; NEIGHBOURS],
@@ -165,9 +168,16 @@ impl Hierarchy {
         &self.stencils
     }
 
-    /// For each place, whether it is predicted from one of its own [`BLOCK`].
-    pub(super) fn leans(&self) -> &[bool] {
-        &self.leans
+    /// All places, in runs of which none is predicted from another of its run. Each lies in one
+    /// [`BLOCK`].
+    #[inline(always)]
+    pub(super) fn runs(&self) -> impl Iterator<Item = Range<usize>> {
+        let mut start = 0;
+        self.runs.iter().map(move |&end| {
+            let run = start..end as usize;
+            start = run.end;
+            run
+        })
     }
 }
 
@@ -284,14 +294,26 @@ impl Builder<'_> {
             #[inline(always)]
             || set_weights(&places, &counts, &mut stencils),
         );
-        let leans = |(place, stencil): (usize, &Stencil)| {
-            // All are earlier ones.
-            let newest = stencil.places.iter().fold(0, |newest, &other| newest.max(other)) as usize;
-            newest / BLOCK == place / BLOCK
-        };
-        let leans = stencils.iter().enumerate().map(leans).collect();
-        Hierarchy { order, stencils, leans }
+        let runs = runs(&stencils);
+        Hierarchy { order, stencils, runs }
     }
+}
+
+/// The ends of the runs of these places.
+#[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
+fn runs(stencils: &[Stencil]) -> Vec<u32> {
+    let (mut runs, mut start) = (Vec::new(), 0);
+    for (place, stencil) in stencils.iter().enumerate() {
+        let leans = stencil.places.iter().any(|&other| other as usize >= start);
+        if place > start && (leans || place % BLOCK == 0) {
+            runs.push(place as u32);
+            start = place;
+        }
+    }
+    if !stencils.is_empty() {
+        runs.push(stencils.len() as u32);
+    }
+    runs
 }
 
 /// Weighs the neighbours of stencils, four at a time.
@@ -357,6 +379,23 @@ mod tests {
         }
         let full = hierarchy.stencils().iter().filter(|stencil| stencil.weights[7] != 0.0).count();
         assert!(full > 800, "{full}");
+    }
+
+    #[test]
+    fn no_place_is_predicted_from_another_of_its_run() {
+        let (places, edges) = grid(40);
+        let hierarchy = Hierarchy::new(&places, edges.iter().copied());
+        let mut next = 0;
+        for run in hierarchy.runs() {
+            assert_eq!(run.start, next);
+            assert!(run.end > next && run.start / BLOCK == (run.end - 1) / BLOCK);
+            next = run.end;
+            let others = hierarchy.stencils()[run.clone()].iter().flat_map(|of| of.places);
+            assert!(run.start == 0 || others.into_iter().all(|other| (other as usize) < run.start));
+        }
+        assert_eq!(next, 1600);
+        assert!(hierarchy.runs().count() < 200);
+        assert_eq!(Hierarchy::new(&[], std::iter::empty()).runs().count(), 0);
     }
 
     #[test]

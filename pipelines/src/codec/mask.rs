@@ -47,6 +47,14 @@ fn same(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
+/// A number that equal tuples share; of one value its bits.
+fn print(tuple: &[f64]) -> u64 {
+    let add = |print: u64, value: &f64| {
+        print.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32) ^ value.to_bits()
+    };
+    tuple.iter().fold(0, add)
+}
+
 impl Mask {
     /// The tuples that many points share, where they are enough to be worth it. `order` says which
     /// tuple stands at each place.
@@ -63,8 +71,10 @@ impl Mask {
             let stride = count.div_ceil(SAMPLES).max(1);
             let sample: Vec<&[f64]> =
                 (0..count).step_by(stride).map(|index| tuple(at(index))).collect();
-            let shares = |of: &[f64]| sample.iter().filter(|other| same(of, other)).count();
-            let found = sample.iter().map(|tuple| (shares(tuple), *tuple)).max_by_key(|of| of.0);
+            let prints: Vec<u64> = sample.iter().map(|tuple| print(tuple)).collect();
+            let shares = |print: u64| prints.iter().filter(|&&other| other == print).count();
+            let found = sample.iter().zip(&prints).map(|(tuple, &print)| (shares(print), *tuple));
+            let found = found.max_by_key(|of| of.0);
             let Some((share, best)) = found else { break };
             if share * 16 < sample.len() || share < 2 {
                 break;

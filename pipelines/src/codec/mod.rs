@@ -32,7 +32,10 @@ mod motion;
 mod node;
 mod plane;
 mod prediction;
+mod ranges;
 mod rans;
+mod run;
+mod tables;
 mod temporal;
 mod topology;
 
@@ -40,4 +43,5 @@ pub use error::CodecError;
 pub use field::{Bound, Field};
 pub use hierarchy::Hierarchy;
 pub use motion::Motion;
+pub(crate) use ranges::ranges;
 pub use topology::{Coded, Topology};

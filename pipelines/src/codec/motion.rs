@@ -28,10 +28,10 @@ pub struct Motion {
     from: Vec<f64>,
     by: Option<Vec<f64>>,
     now: Vec<f64>,
-    /// The displacements from the reference, as they are written and as they are read.
-    free: [Field; 2],
-    /// The last positions as they were given, for the encoder.
-    last: Option<Vec<f64>>,
+    /// The displacements from the reference.
+    free: Field,
+    /// The last positions as they were given to the encoder, and the bound.
+    last: Option<(Vec<[f64; 3]>, f64)>,
     /// Whether the last frame did not go on along a line that was just sent.
     is_free: bool,
 }
@@ -46,7 +46,7 @@ impl Motion {
             by: None,
             now: reference.clone(),
             reference,
-            free: [Field::new(3), Field::new(3)],
+            free: Field::new(3),
             last: None,
             is_free: false,
         }
@@ -76,6 +76,11 @@ impl Motion {
         if found != expected || order.len() != expected {
             return Err(CodecError::Length { found, expected });
         }
+        if self.last.as_ref().is_some_and(|last| last.1 <= bound && last.0 == points) {
+            message.push(STILL);
+            self.is_free = false;
+            return Ok(());
+        }
         let point = |&place: &u32| points.get(place as usize).copied();
         let wanted: Option<Vec<[f64; 3]>> = order.iter().map(point).collect();
         let wanted = wanted.ok_or(CodecError::Length { found, expected })?.into_flattened();
@@ -92,10 +97,10 @@ impl Motion {
             message.extend(number.to_le_bytes());
             self.now = along;
             self.is_free = false;
-        } else if self.is_free || self.begin(topology, &wanted, bound, message)?.is_none() {
+        } else if self.is_free || self.begin(topology, order, &wanted, bound, message)?.is_none() {
             self.encode_free(topology, &wanted, bound, message)?;
         }
-        self.last = Some(wanted);
+        self.last = Some((points.to_vec(), bound));
         Ok(())
     }
 
@@ -103,6 +108,7 @@ impl Motion {
     fn begin(
         &mut self,
         topology: &Topology,
+        order: &[u32],
         wanted: &[f64],
         bound: f64,
         message: &mut Vec<u8>,
@@ -111,16 +117,18 @@ impl Motion {
         let hierarchy = topology.points();
         let start = message.len();
         message.push(NEW);
-        let before = self.last.clone().unwrap_or_else(|| self.now.clone());
-        let more = difference(&before, &self.now);
-        Field::new(3).encode(hierarchy, &identity, &more, Bound::Absolute(bound / 2.0), message)?;
-        let mut rest = &message[start + 1..];
-        let from = sum(&self.now, &Field::new(3).decode(hierarchy, &mut rest)?);
-        let at = message.len();
+        let before: Vec<f64> = match &self.last {
+            Some((last, _)) => order.iter().flat_map(|&place| last[place as usize]).collect(),
+            None => self.now.clone(),
+        };
+        let code = |values: &[f64], bound: f64, message: &mut Vec<u8>| {
+            let bound = Bound::Absolute(bound);
+            Field::new(3).encode_and_show(hierarchy, &identity, values, bound, message)
+        };
+        let more = code(&difference(&before, &self.now), bound / 2.0, message)?;
+        let from = sum(&self.now, &more);
         // Of what was given, not of what was coded: an error there would grow with the number.
-        let by = difference(wanted, &before);
-        Field::new(3).encode(hierarchy, &identity, &by, Bound::Absolute(bound / FINER), message)?;
-        let by = Field::new(3).decode(hierarchy, &mut &message[at..])?;
+        let by = code(&difference(wanted, &before), bound / FINER, message)?;
         let now = sum(&from, &by);
         if !near(&now, wanted, bound) {
             message.truncate(start);
@@ -153,19 +161,15 @@ impl Motion {
         self.is_free = true;
         if let Some(coded) = coded {
             message.push(FREE);
-            let start = message.len();
-            let [write, read] = &mut self.free;
-            write.encode(hierarchy, &identity, &away, coded, message)?;
-            let away = read.decode(hierarchy, &mut &message[start..])?;
+            let away = self.free.encode_and_show(hierarchy, &identity, &away, coded, message)?;
             self.now = sum(&self.reference, &away);
             return Ok(());
         }
         message.push(NEW);
         let back: Vec<f64> = self.now.iter().map(|x| -x).collect();
         Field::new(3).encode(hierarchy, &identity, &back, Bound::Exact, message)?;
-        let at = message.len();
-        Field::new(3).encode(hierarchy, &identity, wanted, Bound::Absolute(bound), message)?;
-        let by = Field::new(3).decode(hierarchy, &mut &message[at..])?;
+        let coded = Bound::Absolute(bound);
+        let by = Field::new(3).encode_and_show(hierarchy, &identity, wanted, coded, message)?;
         self.from = sum(&self.now, &back);
         self.now = sum(&self.from, &by);
         self.by = Some(by);
@@ -210,7 +214,7 @@ impl Motion {
                 self.by = Some(by);
             }
             FREE => {
-                let away = self.free[1].decode(topology.points(), &mut input.0)?;
+                let away = self.free.decode(topology.points(), &mut input.0)?;
                 self.now = sum(&self.reference, &away);
             }
             _ => return Err(CodecError::Damaged("positions of a kind that is not known")),

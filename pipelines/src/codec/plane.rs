@@ -4,32 +4,20 @@
 use tombolo_deform::lanes::with_wide_registers;
 
 use super::CodecError;
-use super::bits::unzigzag;
 use super::bytes::{Input, put_count};
 use super::hierarchy::{BLOCK, Hierarchy};
 use super::node::Node;
-use super::prediction::{predict, sums, sums_of_block};
-use super::rans::{Decoder, Histogram, Number, TABLES, encode};
+use super::prediction::sums_of;
+use super::rans::{Decoder, Numbers, encode};
+use super::run::{CLASSES, Run};
+use super::tables::TABLES;
 use super::temporal::{Modes, SPACE, Ways, cheapest};
 
-/// The number of contexts.
-const CLASSES: usize = 17;
-/// Where each context but the first begins.
-const EDGES: [u16; CLASSES - 1] =
-    [1, 3, 5, 8, 12, 17, 25, 35, 49, 70, 101, 145, 232, 377, 638, 1160];
 /// The tables of the contexts before any are sent.
 const FIRST_TABLES: [u8; CLASSES] =
     [2, 7, 9, 10, 11, 11, 12, 14, 15, 16, 18, 19, 20, 21, 23, 25, 28];
-/// No difference counts for more than this in a context.
-const MOST: f32 = 64.0;
-/// The weights of the last frame's difference and of the preceding component's.
-const LAST: f32 = 20.0;
-const BESIDE: f32 = 12.0;
 /// No difference is larger: in single precision all of them are exact.
 const MOST_STEPS: f64 = 16_777_216.0;
-/// From so many points on, one of so many is asked which way of prediction is best: it takes less
-/// time, and costs two bits in a hundred.
-const SAMPLED: [usize; 2] = [1 << 16, 3];
 /// The bits that another table costs.
 const TABLE_PRICE: f32 = 9.0;
 
@@ -50,6 +38,8 @@ pub(super) struct Around<'a> {
     pub(super) beside: Option<&'a [Node]>,
     /// Grid steps in a step of the difference.
     pub(super) step: f32,
+    /// Whether the frame goes on from earlier ones.
+    pub(super) follows: bool,
 }
 
 /// The values that a plane is to hold, place after place.
@@ -69,14 +59,6 @@ pub(super) fn two_to(exponent: i32) -> f64 {
     f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
-/// The nearest whole number, the even one of two; by adding and subtracting a number that has no
-/// digits behind the point. Beyond 2²², where it would have to be even, it is even.
-#[inline(always)]
-fn nearest(value: f32) -> f32 {
-    const WHOLE: f32 = 12_582_912.0;
-    (value + WHOLE) - WHOLE
-}
-
 /// The nearest whole number in double precision, up to 2⁵¹.
 #[inline(always)]
 fn nearest_double(value: f64) -> f64 {
@@ -84,26 +66,34 @@ fn nearest_double(value: f64) -> f64 {
     (value + WHOLE) - WHOLE
 }
 
-/// The context of each sum of magnitudes, which is a whole number below 2¹³.
-#[inline(always)]
-fn class(context: f32) -> usize {
-    const LENGTH: usize = 1 << 13;
-    static CLASS: [u8; LENGTH] = {
-        let mut classes = [0; LENGTH];
-        let (mut value, mut class) = (0, 0);
-        while value < LENGTH {
-            if class < EDGES.len() && value >= EDGES[class] as usize {
-                class += 1;
-            } else {
-                classes[value] = class as u8;
-                value += 1;
-            }
-        }
-        classes
-    };
-    // With 2²³ added, the number stands in the lowest bits.
-    let context = (context + 8_388_608.0).to_bits() as usize;
-    usize::from(CLASS[context & (LENGTH - 1)])
+/// How a frame becomes the one before.
+#[derive(Clone, Copy)]
+pub(super) struct Shift {
+    /// What a step of the old grid is in the new one.
+    pub(super) scale: f32,
+    /// Whether the frame is the first, which then is the one before that, too.
+    pub(super) is_second: bool,
+}
+
+impl Shift {
+    #[inline(always)]
+    fn of(self, node: Node) -> Node {
+        let [magnitude, now, last, _] = node.0;
+        let before = if self.is_second { now } else { last };
+        Node([magnitude, now, now * self.scale, before * self.scale])
+    }
+}
+
+/// Where the values of a plane go that is decoded.
+pub(super) struct Values<'a> {
+    /// Tuples, place after place.
+    pub(super) tuples: &'a mut [f64],
+    /// How many values a tuple has, and which of them is the plane's.
+    pub(super) components: usize,
+    pub(super) component: usize,
+    /// A value is this and steps of this size.
+    pub(super) offset: f64,
+    pub(super) unit: f64,
 }
 
 impl Plane {
@@ -112,51 +102,37 @@ impl Plane {
         Self { nodes: vec![Node::ZERO; points], tables: FIRST_TABLES }
     }
 
-    /// Makes the last frame the one before; `scale` is what a step of the old grid is in the new one.
-    pub(super) fn shift(&mut self, scale: f32, is_second: bool) {
+    /// Makes the last frame the one before.
+    pub(super) fn shift(&mut self, shift: Shift) {
         for node in &mut self.nodes {
-            let [magnitude, now, last, _] = node.0;
-            let before = if is_second { now } else { last };
-            *node = Node([magnitude, now, now * scale, before * scale]);
+            *node = shift.of(*node);
         }
     }
 
-    #[inline(always)]
-    fn context(&self, around: &Around<'_>, point: usize, sums: Node) -> usize {
-        let beside = around.beside.map_or(0.0, |beside| beside[point].magnitude());
-        class(sums.magnitude() + LAST * self.nodes[point].magnitude() + BESIDE * beside)
-    }
-
-    /// The ways of prediction for a frame that goes on. The nodes have its values then.
-    #[inline(always)]
-    fn ways(&mut self, around: &Around<'_>, wanted: &Wanted<'_>) -> Ways {
+    /// The same, and gives the nodes the next values, as near as single precision has them: to choose
+    /// a way of prediction by.
+    pub(super) fn shift_to(&mut self, shift: Shift, wanted: &Wanted<'_>) {
         let per_unit = two_to(-i32::from(wanted.exponent));
-        for (point, (node, value)) in self.nodes.iter_mut().zip(wanted.values).enumerate() {
-            if around.mask.is_some_and(|mask| mask[point]) {
-                continue;
-            }
+        for (node, value) in self.nodes.iter_mut().zip(wanted.values) {
             #[expect(clippy::cast_possible_truncation, reason = "to compare with")]
             let value = ((value - wanted.offset) * per_unit) as f32;
+            let [magnitude, _, last, before] = shift.of(*node).0;
             // Where nothing can be compared, nothing has changed.
-            let [magnitude, _, last, _] = node.0;
-            node.set(magnitude, if value.is_finite() { value } else { last });
+            *node = Node([magnitude, if value.is_finite() { value } else { last }, last, before]);
         }
-        Ways::new(&self.nodes, around.hierarchy.stencils(), around.mask, around.step)
     }
 
-    /// Codes the next frame of these values; `follows` says whether it goes on from the last. Returns
-    /// the places whose values come out further off than they may: those that are not finite, or
-    /// beyond every step.
+    /// Codes the next frame of these values, which the nodes have if it goes on. Returns the places whose values come out further off
+    /// than they may: those that are not finite, or beyond every step.
     pub(super) fn encode(
         &mut self,
         around: Around<'_>,
-        follows: bool,
         wanted: Wanted<'_>,
         out: &mut Vec<u8>,
     ) -> Vec<usize> {
         with_wide_registers(
             #[inline(always)]
-            || self.encode_with(around, follows, wanted, out),
+            || self.encode_with(around, wanted, out),
         )
     }
 
@@ -164,80 +140,59 @@ impl Plane {
     fn encode_with(
         &mut self,
         around: Around<'_>,
-        follows: bool,
         wanted: Wanted<'_>,
         out: &mut Vec<u8>,
     ) -> Vec<usize> {
         let points = self.nodes.len();
-        let (stencils, leans) = (around.hierarchy.stencils(), around.hierarchy.leans());
-        let per_step = 1.0 / f64::from(around.step);
-        let (unit, per_unit) =
-            (two_to(i32::from(wanted.exponent)), two_to(-i32::from(wanted.exponent)));
-        let ways = follows.then(|| self.ways(&around, &wanted));
+        let stencils = around.hierarchy.stencils();
+        let ways =
+            around.follows.then(|| Ways::new(&self.nodes, stencils, around.mask, around.step));
         let mut modes = match &ways {
             Some(ways) => ways.modes(points),
             None => Modes::uniform(SPACE),
         };
-        let stride = if points < SAMPLED[0] { 1 } else { SAMPLED[1] };
-        let mut known = [Node::ZERO; BLOCK];
-        let mut coded = Vec::with_capacity(points);
-        let mut histograms = [const { Histogram::NEW }; CLASSES];
+        // Some say nearly as well which way of prediction is best.
+        let stride = match points {
+            0..4096 => 1,
+            4096..65536 => 2,
+            _ => 3,
+        };
+        let mut by = modes.coefficients(SPACE);
+        let (mut known, mut current) = ([Node::ZERO; BLOCK], Run::new(around.mask.is_some()));
+        let mut scratch = Scratch::NEW;
+        let mut numbers = Numbers::new(CLASSES, points);
         let mut beyond = Vec::new();
-        for start in (0..points).step_by(BLOCK) {
-            let block = start..points.min(start + BLOCK);
-            let mut by = modes.coefficients(SPACE);
-            let mask = around.mask.map(|mask| &mask[block.clone()]);
-            let is_masked = |point: usize| mask.is_some_and(|mask| mask[point - start]);
-            sums_of_block(&self.nodes, &stencils[block.clone()], mask, &mut known);
-            if let Some(ways) = &ways {
+        for run in around.hierarchy.runs() {
+            if let Some(ways) = &ways
+                && run.start % BLOCK == 0
+            {
                 // Neighbours in this block are taken as they are, not as they will be coded.
+                let block = run.start..points.min(run.start + BLOCK);
+                let mask = around.mask.map(|mask| &mask[block.clone()]);
+                sums_of(&self.nodes, &stencils[block.clone()], mask, &mut known);
                 let mut costs = [0.0; 4];
-                for point in block.clone().step_by(stride) {
-                    if !is_masked(point) {
-                        ways.add_costs(known[point - start], self.nodes[point], &mut costs);
+                for (index, point) in block.enumerate().step_by(stride) {
+                    if mask.is_none_or(|mask| !mask[index]) {
+                        ways.add_costs(known[index], self.nodes[point], &mut costs);
                     }
                 }
                 let mode = cheapest(costs);
                 modes.push(mode);
                 by = modes.coefficients(mode);
+            } else {
+                let mask = around.mask.map(|mask| &mask[run.clone()]);
+                sums_of(&self.nodes, &stencils[run.clone()], mask, &mut known);
             }
-            for point in block {
-                if is_masked(point) {
-                    continue;
-                }
-                let sums = match leans[point] {
-                    true => sums(&self.nodes, &stencils[point]),
-                    false => known[point - start],
-                };
-                let class = self.context(&around, point, sums);
-                let near = nearest(predict(sums, self.nodes[point], by));
-                let value = wanted.values[point];
-                let scaled = (value - wanted.offset) * per_unit;
-                let steps = nearest_double((scaled - f64::from(near)) * per_step);
-                // NaN, too.
-                let steps = if steps.abs() < MOST_STEPS { steps as f32 } else { 0.0 };
-                let now = near + around.step * steps;
-                self.nodes[point].set(steps.abs().min(MOST), now);
-                let off = (wanted.offset + f64::from(now) * unit - value).abs();
-                if off.is_nan() || off > wanted.bound {
-                    beyond.push(point);
-                }
-                #[expect(clippy::cast_possible_truncation, reason = "checked above")]
-                let difference = steps as i32;
-                #[expect(
-                    clippy::cast_sign_loss,
-                    clippy::cast_possible_truncation,
-                    reason = "the bits are meant, and there are 17 classes"
-                )]
-                let number = Number::new((difference << 1 ^ difference >> 31) as u32, class as u8);
-                histograms[class].add(number);
-                coded.push(number);
-            }
+            current.take(&self.nodes, &around, run, &known);
+            current.predict(by);
+            wanted.code(&mut current, around.step, &mut scratch, &mut numbers, &mut beyond);
+            current.put(&mut self.nodes);
         }
         modes.settle();
 
         let (mut changed, mut has_plain) = (0u32, false);
-        for (class, histogram) in histograms.iter().enumerate() {
+        for class in 0..CLASSES {
+            let histogram = numbers.histogram(class);
             if histogram.is_empty() {
                 continue;
             }
@@ -248,7 +203,7 @@ impl Plane {
             }
             has_plain |= histogram.has_plain(table);
         }
-        let lanes = match coded.len() {
+        let lanes = match numbers.len() {
             0..1024 => 0,
             1024..65536 => 1,
             _ => 3u8,
@@ -260,7 +215,7 @@ impl Plane {
             let sent = (0..CLASSES).filter(|class| changed >> class & 1 == 1);
             out.extend(sent.map(|class| self.tables[class]));
         }
-        encode(&coded, &self.tables, has_plain, u32::from(lanes), out);
+        encode(&numbers, &self.tables, has_plain, u32::from(lanes), out);
         beyond
     }
 
@@ -269,15 +224,21 @@ impl Plane {
         &mut self,
         around: Around<'_>,
         input: &mut Input<'_>,
+        values: Values<'_>,
     ) -> Result<(), CodecError> {
         with_wide_registers(
             #[inline(always)]
-            || self.decode_with(around, input),
+            || self.decode_with(around, input, values),
         )
     }
 
     #[inline(always)]
-    fn decode_with(&mut self, around: Around<'_>, input: &mut Input<'_>) -> Result<(), CodecError> {
+    fn decode_with(
+        &mut self,
+        around: Around<'_>,
+        input: &mut Input<'_>,
+        mut values: Values<'_>,
+    ) -> Result<(), CodecError> {
         let points = self.nodes.len();
         let flags = input.byte()?;
         let modes = Modes::read(flags >> 3, points, input)?;
@@ -291,33 +252,97 @@ impl Plane {
                 self.tables[class] = table;
             }
         }
-        let mut decoder = Decoder::new(u32::from(flags & 3), input)?;
-        let (stencils, leans) = (around.hierarchy.stencils(), around.hierarchy.leans());
-        let mut known = [Node::ZERO; BLOCK];
-        for start in (0..points).step_by(BLOCK) {
-            let block = start..points.min(start + BLOCK);
-            let by = modes.of(start);
-            let mask = around.mask.map(|mask| &mask[block.clone()]);
-            let is_masked = |point: usize| mask.is_some_and(|mask| mask[point - start]);
-            sums_of_block(&self.nodes, &stencils[block.clone()], mask, &mut known);
-            for point in block {
-                if is_masked(point) {
-                    continue;
-                }
-                let sums = match leans[point] {
-                    true => sums(&self.nodes, &stencils[point]),
-                    false => known[point - start],
-                };
-                let class = self.context(&around, point, sums);
-                let number = decoder.next(self.tables[class]);
-                #[expect(clippy::cast_possible_truncation, reason = "of 32 bits")]
-                let difference = unzigzag(u64::from(number)) as i32;
-                let near = nearest(predict(sums, self.nodes[point], by));
-                let difference = difference as f32;
-                let now = near + around.step * difference;
-                self.nodes[point].set(difference.abs().min(MOST), now);
+        let mut decoder = Decoder::new(u32::from(flags & 3), &self.tables, input)?;
+        let stencils = around.hierarchy.stencils();
+        let (mut known, mut current) = ([Node::ZERO; BLOCK], Run::new(around.mask.is_some()));
+        let Scratch { mut numbers, mut steps, .. } = Scratch::NEW;
+        for run in around.hierarchy.runs() {
+            let by = modes.of(run.start);
+            let mask = around.mask.map(|mask| &mask[run.clone()]);
+            sums_of(&self.nodes, &stencils[run.clone()], mask, &mut known);
+            current.take(&self.nodes, &around, run, &known);
+            current.predict(by);
+            let numbers = &mut numbers[..current.len()];
+            decoder.take(current.classes(), numbers);
+            for (steps, &number) in steps.iter_mut().zip(&*numbers) {
+                #[expect(clippy::cast_possible_wrap, reason = "a zigzag number")]
+                let difference = (number >> 1) as i32 ^ -((number & 1) as i32);
+                *steps = difference as f32;
             }
+            current.step(around.step, &steps);
+            current.put(&mut self.nodes);
+            values.put(&current);
         }
         decoder.finish()
+    }
+}
+
+/// Room for the numbers of a run.
+struct Scratch {
+    values: [f64; BLOCK],
+    steps: [f32; BLOCK],
+    numbers: [u32; BLOCK],
+}
+
+impl Scratch {
+    const NEW: Self = Self { values: [0.0; BLOCK], steps: [0.0; BLOCK], numbers: [0; BLOCK] };
+}
+
+impl Wanted<'_> {
+    /// Takes up the steps that lead from a run's predictions to the values, and adds their numbers to
+    /// those that are coded. Adds the places where the value that comes out is off.
+    #[inline(always)]
+    #[expect(
+        clippy::cast_sign_loss,
+        clippy::cast_possible_truncation,
+        reason = "no step is more than 2^24, and the bits are meant"
+    )]
+    fn code(
+        &self,
+        run: &mut Run,
+        step: f32,
+        scratch: &mut Scratch,
+        numbers: &mut Numbers,
+        beyond: &mut Vec<usize>,
+    ) {
+        let count = run.len();
+        let (values, steps) = (&mut scratch.values[..count], &mut scratch.steps[..count]);
+        run.gather(self.values, values);
+        let per_step = 1.0 / f64::from(step);
+        let (unit, per_unit) =
+            (two_to(i32::from(self.exponent)), two_to(-i32::from(self.exponent)));
+        let near = run.near();
+        for index in 0..count {
+            let scaled = (values[index] - self.offset) * per_unit;
+            let number = nearest_double((scaled - f64::from(near[index])) * per_step);
+            // NaN, too.
+            steps[index] = if number.abs() < MOST_STEPS { number as f32 } else { 0.0 };
+        }
+        let zigzag = &mut scratch.numbers[..count];
+        for index in 0..count {
+            let difference = steps[index] as i32;
+            zigzag[index] = (difference << 1 ^ difference >> 31) as u32;
+        }
+        numbers.extend(zigzag, run.classes());
+        run.step(step, steps);
+        let now = run.now();
+        let off = |index: usize| (self.offset + f64::from(now[index]) * unit - values[index]).abs();
+        // No value that is no number is near.
+        let near = (0..count).fold(0, |near, index| near + usize::from(off(index) <= self.bound));
+        if near < count {
+            let is_beyond = |&index: &usize| off(index).is_nan() || off(index) > self.bound;
+            beyond.extend((0..count).filter(is_beyond).map(|index| run.place(index)));
+        }
+    }
+}
+
+impl Values<'_> {
+    /// Puts the values of a run into their tuples.
+    #[inline(always)]
+    fn put(&mut self, run: &Run) {
+        for (at, &now) in run.now().iter().enumerate() {
+            self.tuples[run.place(at) * self.components + self.component] =
+                self.offset + f64::from(now) * self.unit;
+        }
     }
 }

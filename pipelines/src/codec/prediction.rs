@@ -12,37 +12,47 @@ pub(super) type Coefficients = [f32; 4];
 /// The context of a value, which is a whole number, and its prediction from its neighbours now and in
 /// the two frames before, summed from the nearest to the farthest in single precision.
 #[inline(always)]
-fn sum(nodes: &[Node], stencil: &Stencil, sums: &mut Node) {
+fn sum(nodes: &[Node], stencil: &Stencil, context: &[f32; NEIGHBOURS], sums: &mut Node) {
     let mut sum = Node::ZERO;
     for index in 0..NEIGHBOURS {
         let node = nodes[stencil.places[index] as usize];
-        sum.add(node, stencil.weights[index], CONTEXT[index]);
+        sum.add(node, stencil.weights[index], context[index]);
     }
     *sums = sum;
 }
 
-/// The sums of one point.
-// A function of its own: inlined, its lanes would be summed one by one.
-#[inline(never)]
-pub(super) fn sums(nodes: &[Node], stencil: &Stencil) -> Node {
-    let mut sums = Node::ZERO;
-    sum(nodes, stencil, &mut sums);
-    sums
-}
-
 /// The sums of points, but for those with a mask, with the nodes as they are.
 #[inline(always)]
-pub(super) fn sums_of_block(
+pub(super) fn sums_of(
     nodes: &[Node],
     stencils: &[Stencil],
     mask: Option<&[bool]>,
     sums: &mut [Node; BLOCK],
 ) {
+    // As constants they would be put together anew for each neighbour of each point in WebAssembly.
+    let context = std::hint::black_box(CONTEXT);
     for (index, (stencil, sums)) in stencils.iter().zip(sums).enumerate() {
         if mask.is_none_or(|mask| !mask[index]) {
-            sum(nodes, stencil, sums);
+            sum(nodes, stencil, &context, sums);
         }
     }
+}
+
+/// The sums of the next points of a list, as many as there is room for.
+#[inline(always)]
+pub(super) fn sums_of_each<'sums>(
+    nodes: &[Node],
+    stencils: &[Stencil],
+    points: &mut impl Iterator<Item = usize>,
+    sums: &'sums mut [(usize, Node); BLOCK],
+) -> &'sums [(usize, Node)] {
+    let mut count = 0;
+    for ((to, sums), point) in sums.iter_mut().zip(points) {
+        *to = point;
+        sum(nodes, &stencils[point], &CONTEXT, sums);
+        count += 1;
+    }
+    &sums[..count]
 }
 
 /// The prediction behind the sums, in this order.

@@ -4,10 +4,10 @@ use super::CodecError;
 use super::bytes::Input;
 use super::hierarchy::{BLOCK, Stencil};
 use super::node::Node;
-use super::prediction::{Coefficients, sums};
+use super::prediction::{Coefficients, sums_of_each};
 
-/// The coefficients are fitted to about so many points: they say as much as all.
-const FITTED_TO: usize = 16384;
+/// The coefficients are fitted to about so many points: they say nearly as much as all.
+const FITTED_TO: usize = 4096;
 /// Neighbours alone.
 pub(super) const SPACE: u8 = 0;
 /// The ways that are fixed: neighbours alone; the last frame alone; the last frame and how the
@@ -118,7 +118,7 @@ impl Ways {
         mask: Option<&[bool]>,
         step: f32,
     ) -> Self {
-        let fitted = fit(nodes, stencils, |point| mask.is_some_and(|mask| mask[point]));
+        let fitted = fit(nodes, stencils, mask);
         let fit = fitted.map(|part| f32::from(part) / PARTS);
         let ways = [FIXED[0], FIXED[1], FIXED[2], fit];
         let coefficients = [0, 1, 2, 3].map(|index| ways.map(|way| way[index]));
@@ -166,22 +166,27 @@ fn logarithm(number: f32) -> f32 {
 /// The coefficients with the least squares of what is left.
 #[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
 #[inline(always)]
-fn fit(nodes: &[Node], stencils: &[Stencil], is_masked: impl Fn(usize) -> bool) -> [i8; 4] {
+fn fit(nodes: &[Node], stencils: &[Stencil], mask: Option<&[bool]>) -> [i8; 4] {
     let (mut matrix, mut right) = ([[0.0f64; 4]; 4], [0.0f64; 4]);
     let stride = nodes.len().div_ceil(FITTED_TO).max(1);
-    for point in (0..nodes.len()).step_by(stride) {
-        if is_masked(point) {
-            continue;
-        }
-        let sums = sums(nodes, &stencils[point]).0;
-        let [_, now, before, earlier] = sums.map(f64::from);
-        let [_, value, last, second] = nodes[point].0.map(f64::from);
-        let terms = [now - before, now - last, last - second, before - earlier];
-        for row in 0..4 {
-            for column in 0..4 {
-                matrix[row][column] += terms[row] * terms[column];
+    let mut points =
+        (0..nodes.len()).step_by(stride).filter(|&point| mask.is_none_or(|mask| !mask[point]));
+    let mut several = [(0, Node::ZERO); BLOCK];
+    loop {
+        let several = sums_of_each(nodes, stencils, &mut points, &mut several);
+        for &(point, sums) in several {
+            let [_, now, before, earlier] = sums.0.map(f64::from);
+            let [_, value, last, second] = nodes[point].0.map(f64::from);
+            let terms = [now - before, now - last, last - second, before - earlier];
+            for row in 0..4 {
+                for column in 0..4 {
+                    matrix[row][column] += terms[row] * terms[column];
+                }
+                right[row] += terms[row] * (value - last);
             }
-            right[row] += terms[row] * (value - last);
+        }
+        if several.len() < BLOCK {
+            break;
         }
     }
     let trace: f64 = (0..4).map(|index| matrix[index][index]).sum();

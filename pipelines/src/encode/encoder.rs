@@ -9,7 +9,7 @@ use super::elements::Elements;
 use super::error::EncodeError;
 use super::layout::{Kind, PREAMBLE, preamble, put_name};
 use crate::codec::bytes::{put_block, put_count};
-use crate::codec::{Bound, CodecError, Coded, Field, Motion, Topology};
+use crate::codec::{self, Bound, CodecError, Coded, Field, Motion, Topology};
 use crate::extract::{self, Association, Extract, ExtractFeatures};
 use crate::language::ErrorBound;
 use crate::run::Frame;
@@ -67,7 +67,7 @@ impl Encoded {
 /// Encodes the frames of a view, one encoder for each view.
 ///
 /// Whatever depends on the cells alone is kept as long as they stay the same, and the last frame
-/// with it: some 16 bytes for each value of a field, and up to 72 for each coordinate.
+/// with it: some 16 bytes for each value of a field, and up to 56 for each coordinate.
 #[derive(Debug, Default)]
 pub struct Encoder {
     topology: Option<KnownTopology>,
@@ -193,17 +193,8 @@ fn bound(error: ErrorBound, extent: f64) -> Bound {
 
 /// The widest range of any component over the values that are finite.
 fn extent(field: &extract::Field) -> f64 {
-    let mut widest = 0.0_f64;
-    for component in 0..field.components {
-        let values = field.values.iter().skip(component).step_by(field.components);
-        let [least, largest] = values
-            .filter(|value| value.is_finite())
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[least, largest], &value| {
-                [least.min(value), largest.max(value)]
-            });
-        widest = widest.max(largest - least);
-    }
-    widest
+    let ranges = codec::ranges(&field.values, field.components);
+    ranges.into_iter().fold(0.0_f64, |widest, [least, largest]| widest.max(largest - least))
 }
 
 /// A topology that was coded.
