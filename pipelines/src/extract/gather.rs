@@ -53,7 +53,7 @@ impl Rows {
 
 /// A point between the two ends of an edge, or a vertex where they are one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Crossing {
+pub(crate) struct Crossing {
     /// The ends, the lower number first.
     pub(super) edge: [u32; 2],
     /// How far from the first to the second, 0 to 1.

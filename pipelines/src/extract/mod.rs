@@ -27,6 +27,7 @@ mod skin;
 mod source;
 mod statistics;
 mod streamlines;
+mod supports;
 mod take;
 mod walls;
 
