@@ -26,6 +26,8 @@ pub(super) struct Cut {
     pub(super) cells: Cells,
     /// The cell that each polygon or line lies in.
     pub(super) owners: Vec<u32>,
+    /// Whether an edge that is cut has an end whose coordinates are not finite.
+    pub(super) is_broken: bool,
 }
 
 /// Cuts cells of dimension 3 to polygons and cells of dimension 2 to lines; others are passed over.
@@ -326,6 +328,8 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
 
     /// The number of the point on an edge that has none yet, or has an end at 0.
     fn new_crossing(&mut self, [a, b]: [u32; 2]) -> u32 {
+        let ends = [a, b].map(|vertex| self.coordinates[vertex as usize]);
+        self.cut.is_broken |= !ends.as_flattened().iter().all(|x| x.is_finite());
         let (at_a, at_b) = ((self.value)(a as usize), (self.value)(b as usize));
         let edge = match (at_a == 0.0, at_b == 0.0) {
             (true, _) => [a, a],

@@ -80,6 +80,12 @@ pub(super) enum Owners<'a> {
     OfPoints(&'a [u32]),
 }
 
+/// The vectors of an array where they lie in memory as vectors do.
+pub(super) fn lent<'a>(view: &ArrayView<'a>) -> Option<&'a [Vector]> {
+    let values = view.contiguous().filter(|_| view.components() == 3)?;
+    Some(values.as_chunks::<3>().0)
+}
+
 /// The coordinates of these vertices.
 pub(super) fn points(
     points: &ArrayView,
@@ -87,8 +93,7 @@ pub(super) fn points(
     cycle: u64,
 ) -> Result<Vec<Vector>, ExtractError> {
     // As with fields, a slice is read faster than what asks for the type of each number.
-    if let Some(all) = points.contiguous().filter(|_| points.components() == 3) {
-        let (all, _) = all.as_chunks::<3>();
+    if let Some(all) = lent(points) {
         let found: Vec<Vector> = vertices.iter().map(|&vertex| all[vertex as usize]).collect();
         if found.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite()) {
             return Ok(found);
