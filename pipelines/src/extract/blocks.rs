@@ -112,8 +112,8 @@ fn bit(vertex: u32) -> (usize, u32) {
 /// Vertices of a word.
 const VERTICES: usize = 32;
 
-/// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is 0
-/// or above, neither where it is NaN.
+/// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is
+/// 0 or above, neither where it is NaN.
 pub(super) struct Sides {
     /// Those behind and those ahead, side by side: who asks for one asks for the other.
     words: Vec<[u32; 2]>,
@@ -171,7 +171,8 @@ impl Sides {
     #[inline]
     pub(super) fn are_crossed(&self, vertices: &[u32]) -> bool {
         let ahead = vertices.iter().filter(|&&vertex| self.is_ahead(vertex)).count();
-        // Those that are not ahead are looked at where there are some of both: few cells are crossed.
+        // Those that are not ahead are looked at where there are some of both: few cells are
+        // crossed.
         let is_known = |&vertex: &u32| self.is_ahead(vertex) || self.is_behind(vertex);
         ahead > 0 && ahead < vertices.len() && vertices.iter().all(is_known)
     }

@@ -14,7 +14,7 @@ use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::vector::{add, cross, dot, subtract};
 
 use super::blocks::{Blocks, Sides};
-use super::gather::Crossing;
+use super::gather::{Crossing, are_finite};
 
 /// The cut of a mesh.
 #[derive(Debug, Default)]
@@ -329,7 +329,7 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
     /// The number of the point on an edge that has none yet, or has an end at 0.
     fn new_crossing(&mut self, [a, b]: [u32; 2]) -> u32 {
         let ends = [a, b].map(|vertex| self.coordinates[vertex as usize]);
-        self.cut.is_broken |= !ends.as_flattened().iter().all(|x| x.is_finite());
+        self.cut.is_broken |= !are_finite(&ends);
         let (at_a, at_b) = ((self.value)(a as usize), (self.value)(b as usize));
         let edge = match (at_a == 0.0, at_b == 0.0) {
             (true, _) => [a, a],

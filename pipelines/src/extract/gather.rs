@@ -86,6 +86,11 @@ pub(super) fn lent<'a>(view: &ArrayView<'a>) -> Option<&'a [Vector]> {
     Some(values.as_chunks::<3>().0)
 }
 
+/// Whether all coordinates are finite. Without a branch, which processors do many at a time.
+pub(super) fn are_finite(points: &[Vector]) -> bool {
+    points.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite())
+}
+
 /// The coordinates of these vertices.
 pub(super) fn points(
     points: &ArrayView,
@@ -95,7 +100,7 @@ pub(super) fn points(
     // As with fields, a slice is read faster than what asks for the type of each number.
     if let Some(all) = lent(points) {
         let found: Vec<Vector> = vertices.iter().map(|&vertex| all[vertex as usize]).collect();
-        if found.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite()) {
+        if are_finite(&found) {
             return Ok(found);
         }
     }

@@ -55,7 +55,8 @@ impl Source {
     /// [`ExtractError::UnknownField`], [`ExtractError::NotOfVertices`] or
     /// [`ExtractError::DecidingNotFinite`], and as [`slice`](Self::slice).
     pub fn contour(&mut self, input: &Input, contour: &Contour) -> Result<Extracted, ExtractError> {
-        // Nothing is kept for another step, so that it need not be known whether the mesh has moved.
+        // Nothing is kept for another step, so that it need not be known whether the mesh has
+        // moved.
         let lent = gather::lent(&input.channel.mesh.points);
         let fault = if lent.is_some() { Ok(()) } else { self.update(input) };
         let values = fault.and_then(|()| self.vertex_values(input, &contour.field));
