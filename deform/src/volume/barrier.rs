@@ -15,10 +15,6 @@ const MEAN: f64 = 0.01;
 const LONGER: usize = 30;
 const SHORTER: usize = 12;
 
-/// The fall along a whole step, by the slope, from which on a longer one may be better: it is half for
-/// a quadratic energy, and more near the barrier, which falls off as the square of the distance.
-const FALL: f64 = 0.55;
-
 /// Where a vertex comes first, the others of a tetrahedron follow so that its orientation stays.
 const FIRST: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 0, 1, 3], [3, 0, 2, 1]];
 
@@ -192,6 +188,25 @@ impl Star {
             || self.fours.iter_mut().for_each(Four::complete),
         );
     }
+
+    /// Whether every quality is above `bound` where the vertex is at `point`.
+    pub(super) fn is_above(&self, point: Vector, bound: f64) -> bool {
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                let (point, bound) = (point.map(Lanes::all), Lanes::all(bound));
+                self.fours.iter().all(|four| {
+                    let seen = four.seen_from(point);
+                    let mut least = Lanes::all(1.0);
+                    for corner in 0..4 {
+                        let above = seen.scaled - bound * seen.roots[corner];
+                        least = least.least(above.where_finite(four.roots[corner], least));
+                    }
+                    least.all_above(0.0)
+                })
+            },
+        )
+    }
 }
 
 /// The energy that one sweep lowers: `Σ (δ / (q - τ))² - 0.01 ln q` over the corners `q` of a star.
@@ -205,8 +220,6 @@ pub(super) struct Barrier {
 
 /// The energy at a place, with its gradient and Hessian.
 pub(super) struct Derivatives {
-    /// Whether every corner is above the bound that was asked for; the rest is of use where not.
-    pub(super) is_good: bool,
     pub(super) energy: f64,
     pub(super) gradient: Vector,
     pub(super) hessian: [Vector; 3],
@@ -241,16 +254,15 @@ impl Barrier {
     }
 
     /// A better place of a vertex, or its own where none is found.
-    pub(super) fn improved(&self, point: Vector, star: &Star, there: &Derivatives) -> Vector {
-        let Derivatives { energy, gradient, hessian, .. } = there;
-        let Some(direction) = newton(gradient, hessian) else { return point };
+    pub(super) fn improved(&self, point: Vector, star: &Star) -> Vector {
+        let Derivatives { energy, gradient, hessian } = self.derivatives(point, star);
+        let Some(direction) = newton(&gradient, &hessian) else { return point };
         let along = |length: f64| self.energy(add(point, scale(direction, length)), star);
-        searched(point, direction, *energy, dot(direction, *gradient), along)
+        searched(point, direction, energy, dot(direction, gradient), along)
     }
 
-    /// The energy, and its gradient and Hessian by the place of the vertex; and whether every corner
-    /// is above `good` there.
-    pub(super) fn derivatives(&self, point: Vector, star: &Star, good: f64) -> Derivatives {
+    /// The energy, and its gradient and Hessian by the place of the vertex.
+    pub(super) fn derivatives(&self, point: Vector, star: &Star) -> Derivatives {
         with_wide_registers(
             #[inline(always)]
             || {
@@ -259,9 +271,7 @@ impl Barrier {
                     (Lanes::all(self.floor), Lanes::all(self.gap), Lanes::ZERO);
                 let (one, mean) = (Lanes::all(1.0), Lanes::all(MEAN));
                 let (two, six) = (Lanes::all(2.0), Lanes::all(6.0));
-                let good = Lanes::all(good);
                 let (mut sum, mut logarithms, mut is_above) = (zero, 0.0, true);
-                let mut is_good = true;
                 let mut gradient = [zero; 3];
                 let mut hessian = [[zero; 3]; 3];
                 for four in &star.fours {
@@ -277,12 +287,6 @@ impl Barrier {
                     let normal = four.normal.map(|part| part * by_determinant);
                     let above = seen.roots.map(|root| seen.scaled - floor * root);
                     let mut parts = [zero; 4];
-                    let mut least = one;
-                    for corner in 0..4 {
-                        let beyond = seen.scaled - good * seen.roots[corner];
-                        least = least.least(beyond.where_finite(four.roots[corner], least));
-                    }
-                    is_good &= least.all_above(0.0);
                     for corner in 0..4 {
                         // The derivatives of -ln q.
                         let own = if corner == 0 { 0..3 } else { corner - 1..corner };
@@ -327,7 +331,6 @@ impl Barrier {
                 let h = |row: usize, column: usize| hessian[row.max(column)][row.min(column)].sum();
                 let energy = sum.sum() - MEAN * logarithms;
                 Derivatives {
-                    is_good,
                     energy: if is_above { finite_or_infinite(energy) } else { f64::INFINITY },
                     gradient: gradient.map(Lanes::sum),
                     hessian: std::array::from_fn(|row| {
@@ -369,8 +372,7 @@ pub(super) fn searched(
     for _ in 0..SHORTER {
         let reached = energy(length);
         if reached <= before + 1e-4 * length * slope {
-            // A quadratic energy falls by half of the slope; there no longer step is better.
-            if length < 1.0 || before - reached < -FALL * slope {
+            if length < 1.0 {
                 return at(length);
             }
             let mut least = reached;
@@ -462,7 +464,7 @@ mod tests {
     fn derivatives_are_those_of_the_energy() {
         let (point, star) = star();
         let barrier = Barrier { floor: 0.2, gap: 0.1 };
-        let Derivatives { energy, gradient, hessian, .. } = barrier.derivatives(point, &star, 1.0);
+        let Derivatives { energy, gradient, hessian } = barrier.derivatives(point, &star);
         assert!((energy - barrier.energy(point, &star)).abs() < 1e-13 * energy);
         for axis in 0..3 {
             let at = |step: f64| {
@@ -477,7 +479,7 @@ mod tests {
                 gradient[axis]
             );
             let [after, before] =
-                [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star, 1.0).gradient);
+                [1e-6, -1e-6].map(|step| barrier.derivatives(at(step), &star).gradient);
             for row in 0..3 {
                 let bend = (after[row] - before[row]) / 2e-6;
                 assert!(
@@ -505,8 +507,10 @@ mod tests {
             for index in 0..4 {
                 let star = of(&[(simplex, index)], &points);
                 assert!((barrier.energy(points[index], &star) - expected).abs() < 1e-13, "{index}");
-                let is_good = |good| barrier.derivatives(points[index], &star, good).is_good;
-                assert!(is_good(0.999 * least) && !is_good(1.001 * least));
+                assert!(
+                    star.is_above(points[index], 0.999 * least)
+                        && !star.is_above(points[index], 1.001 * least)
+                );
             }
             assert_eq!(
                 Barrier { floor: least, ..barrier }

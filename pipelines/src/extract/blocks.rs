@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use tombolo_deform::mesh::Cells;
+use tombolo_deform::lanes::with_wide_registers;
+use tombolo_deform::mesh::{CellType, Cells};
 
 /// Cells of a block: few enough that a block that is crossed has few cells that are not.
 const CELLS: usize = 16;
@@ -18,6 +19,7 @@ pub(super) struct Blocks {
     ends: Vec<usize>,
     /// The numbers of the words in which a block has vertices, and its vertices in each.
     words: Vec<(u32, u32)>,
+    are_tetrahedra: bool,
 }
 
 impl Blocks {
@@ -41,7 +43,8 @@ impl Blocks {
             ends.push(words.len());
         }
         words.shrink_to_fit();
-        Self { cells: cells.len(), ends, words }
+        let are_tetrahedra = cells.uniform_type() == Some(CellType::Tetra);
+        Self { cells: cells.len(), ends, words, are_tetrahedra }
     }
 
     /// The cells of each block, and the words that have its vertices.
@@ -53,13 +56,18 @@ impl Blocks {
         })
     }
 
-    /// The cells of the blocks with vertices on both sides.
-    pub(super) fn crossed(&self, sides: &Sides) -> impl Iterator<Item = usize> {
+    /// Whether all cells are tetrahedra.
+    pub(super) fn are_tetrahedra(&self) -> bool {
+        self.are_tetrahedra
+    }
+
+    /// The cells of each block with vertices on both sides.
+    pub(super) fn crossed(&self, sides: &Sides) -> impl Iterator<Item = Range<usize>> {
         let is_crossed = |words: &[(u32, u32)]| {
             let [behind, ahead, _] = sides.of_block(words);
             behind && ahead
         };
-        self.iter().filter(move |(_, words)| is_crossed(words)).flat_map(|(cells, _)| cells)
+        self.iter().filter(move |(_, words)| is_crossed(words)).map(|(cells, _)| cells)
     }
 
     /// Each block, and what is known of its cells where all functions are to be 0 or above.
@@ -101,46 +109,70 @@ fn bit(vertex: u32) -> (usize, u32) {
     ((vertex / 32) as usize, 1 << (vertex % 32))
 }
 
-/// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is 0
-/// or above, neither where it is NaN.
+/// Vertices of a word.
+const VERTICES: usize = 32;
+
+/// The sides of a function at the vertices, as bits: behind where it is below 0, ahead where it is
+/// 0 or above, neither where it is NaN.
 pub(super) struct Sides {
-    behind: Vec<u32>,
-    ahead: Vec<u32>,
+    /// Those behind and those ahead, side by side: who asks for one asks for the other.
+    words: Vec<[u32; 2]>,
 }
 
 impl Sides {
     pub(super) fn new(vertices: usize, value: impl Fn(usize) -> f64) -> Self {
-        let (mut behind, mut ahead) = (Vec::new(), Vec::new());
-        for start in (0..vertices).step_by(32) {
-            let (mut below, mut above) = (0_u32, 0_u32);
-            for vertex in start..vertices.min(start + 32) {
-                let value = value(vertex);
-                below |= u32::from(value < 0.0) << (vertex - start);
-                above |= u32::from(value >= 0.0) << (vertex - start);
-            }
-            behind.push(below);
-            ahead.push(above);
+        let mut words = Vec::with_capacity(vertices.div_ceil(VERTICES));
+        with_wide_registers(
+            #[inline(always)]
+            || {
+                for word in 0..vertices / VERTICES {
+                    words.push(sides(std::array::from_fn(|bit| value(VERTICES * word + bit))));
+                }
+            },
+        );
+        let rest = vertices / VERTICES * VERTICES;
+        if rest < vertices {
+            // What is no vertex lies on neither side.
+            let of = |bit: usize| if rest + bit < vertices { value(rest + bit) } else { f64::NAN };
+            words.push(sides(std::array::from_fn(of)));
         }
-        Self { behind, ahead }
+        Self { words }
     }
 
     #[inline]
     pub(super) fn is_ahead(&self, vertex: u32) -> bool {
         let (word, bit) = bit(vertex);
-        self.ahead[word] & bit != 0
+        self.words[word][1] & bit != 0
     }
 
     #[inline]
     pub(super) fn is_behind(&self, vertex: u32) -> bool {
         let (word, bit) = bit(vertex);
-        self.behind[word] & bit != 0
+        self.words[word][0] & bit != 0
+    }
+
+    /// Which corners of a tetrahedron lie ahead, by bits; `None` where the surface does not cut it:
+    /// all lie on one side, or one on neither. Without a branch for each corner, which would be
+    /// foretold wrongly as often as not.
+    #[inline]
+    pub(super) fn of_tetrahedron(&self, corners: [u32; 4]) -> Option<usize> {
+        let mask = |side: usize| {
+            (0..4).fold(0, |mask, corner| {
+                let (word, _) = bit(corners[corner]);
+                mask | ((self.words[word][side] >> (corners[corner] % 32) & 1) as usize) << corner
+            })
+        };
+        let ahead = mask(1);
+        // Few cells are cut, and of these the rest must lie behind.
+        (ahead != 0 && ahead != 15 && mask(0) | ahead == 15).then_some(ahead)
     }
 
     /// Whether these vertices lie on both sides, and none of them on neither.
     #[inline]
     pub(super) fn are_crossed(&self, vertices: &[u32]) -> bool {
         let ahead = vertices.iter().filter(|&&vertex| self.is_ahead(vertex)).count();
-        // Those that are not ahead are looked at where there are some of both: few cells are crossed.
+        // Those that are not ahead are looked at where there are some of both: few cells are
+        // crossed.
         let is_known = |&vertex: &u32| self.is_ahead(vertex) || self.is_behind(vertex);
         ahead > 0 && ahead < vertices.len() && vertices.iter().all(is_known)
     }
@@ -149,13 +181,25 @@ impl Sides {
     fn of_block(&self, words: &[(u32, u32)]) -> [bool; 3] {
         let (mut behind, mut ahead, mut neither) = (0, 0, 0);
         for &(word, vertices) in words {
-            let [below, above] = [self.behind[word as usize], self.ahead[word as usize]];
+            let [below, above] = self.words[word as usize];
             behind |= below & vertices;
             ahead |= above & vertices;
             neither |= vertices & !(below | above);
         }
         [behind != 0, ahead != 0, neither != 0]
     }
+}
+
+/// The sides of the vertices of a word: those behind, and those ahead.
+#[inline(always)]
+fn sides(values: [f64; VERTICES]) -> [u32; 2] {
+    [bits(&values, |value| value < 0.0), bits(&values, |value| value >= 0.0)]
+}
+
+#[inline(always)]
+fn bits(values: &[f64; VERTICES], is: impl Fn(f64) -> bool) -> u32 {
+    let bits = values.iter().enumerate();
+    bits.fold(0, |bits, (bit, &value)| bits | u32::from(is(value)) << bit)
 }
 
 #[cfg(test)]
@@ -196,5 +240,21 @@ mod tests {
         assert!(sides.are_crossed(&[0, 1, 3]));
         assert!(!sides.are_crossed(&[0, 1, 2]), "one has no value");
         assert!(!sides.are_crossed(&[0, 4]) && !sides.are_crossed(&[1, 3]));
+    }
+
+    #[test]
+    fn tetrahedra_are_cut_where_their_corners_lie_on_both_sides() {
+        let value = |vertex: usize| [-1.0, 0.0, 2.0, f64::NAN, -0.5][vertex % 7 % 5];
+        let sides = Sides::new(100, value);
+        for corners in (0..97).map(|first| [first, (first * 13 + 5) % 100, first + 2, first + 1]) {
+            let ahead = (0..4).filter(|&corner| sides.is_ahead(corners[corner]));
+            let ahead = ahead.fold(0, |mask, corner| mask | 1 << corner);
+            let expected = sides.are_crossed(&corners).then_some(ahead);
+            assert_eq!(sides.of_tetrahedron(corners), expected, "{corners:?}");
+        }
+        for vertex in 0..100 {
+            let expected = [value(vertex as usize) < 0.0, value(vertex as usize) >= 0.0];
+            assert_eq!([sides.is_behind(vertex), sides.is_ahead(vertex)], expected);
+        }
     }
 }

@@ -11,6 +11,7 @@ use super::decompose::Faces;
 use super::gather::Rows;
 use super::pattern::{Base, Pattern};
 use super::source::{Origin, Support};
+use super::supports::Supports;
 
 /// A vertex, or a point that was cut out.
 #[derive(Clone, Copy)]
@@ -452,7 +453,7 @@ impl<'a> Clipper<'a> {
             base: Base::Rows(rows),
             cells: self.made.into(),
             owners: self.owners.into(),
-            origin: Origin::Between(supports.into()),
+            origin: Origin::Between(Supports::Each(supports.into())),
         }
     }
 }

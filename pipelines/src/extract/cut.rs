@@ -14,18 +14,20 @@ use tombolo_deform::mesh::{CellType, Cells, MeshError, Vector};
 use tombolo_deform::vector::{add, cross, dot, subtract};
 
 use super::blocks::{Blocks, Sides};
-use super::gather::Crossing;
+use super::gather::{Crossing, are_finite};
 
 /// The cut of a mesh.
 #[derive(Debug, Default)]
 pub(super) struct Cut {
     pub(super) points: Vec<Vector>,
     pub(super) crossings: Vec<Crossing>,
-    /// The number of the function that each point lies on.
-    pub(super) layers: Vec<u32>,
+    /// How many points there are up to each function's last.
+    pub(super) ends: Vec<u32>,
     pub(super) cells: Cells,
     /// The cell that each polygon or line lies in.
     pub(super) owners: Vec<u32>,
+    /// Whether an edge that is cut has an end whose coordinates are not finite.
+    pub(super) is_broken: bool,
 }
 
 /// Cuts cells of dimension 3 to polygons and cells of dimension 2 to lines; others are passed over.
@@ -44,27 +46,41 @@ pub(super) fn cut(
     value: impl Fn(usize, usize) -> f64,
     counts: impl Fn(usize) -> bool,
 ) -> Result<Cut, MeshError> {
-    let mut cut = Cut::default();
-    for (layer, index) in (0..).zip(0..layers) {
-        let value = |vertex: usize| value(index, vertex);
+    let (mut cut, mut known) = (Cut::default(), KnownEdges::new(points.len()));
+    let all = cells.connectivity().as_chunks::<4>().0;
+    let tetrahedra = Some(all).filter(|_| blocks.are_tetrahedra());
+    for layer in 0..layers {
+        let value = |vertex: usize| value(layer, vertex);
         let sides = Sides::new(points.len(), value);
+        known.begin(cut.points.len());
         let mut cutter = Cutter {
-            layer,
             value,
             sides: &sides,
             coordinates: points,
-            known: KnownEdges::new(points.len(), cut.points.len()),
+            known: &mut known,
             segments: Vec::new(),
             polygon: Vec::new(),
             directions: Vec::new(),
-            cut,
+            cut: &mut cut,
         };
-        for cell in blocks.crossed(&sides) {
-            if sides.are_crossed(cells.vertices(cell)) && counts(cell) {
-                cutter.cell(cells, cell)?;
+        for block in blocks.crossed(&sides) {
+            let Some(tetrahedra) = tetrahedra else {
+                for cell in block {
+                    if sides.are_crossed(cells.vertices(cell)) && counts(cell) {
+                        cutter.cell(cells, cell)?;
+                    }
+                }
+                continue;
+            };
+            for (cell, corners) in block.clone().zip(&tetrahedra[block]) {
+                if let Some(ahead) = sides.of_tetrahedron(*corners)
+                    && counts(cell)
+                {
+                    cutter.tetrahedron(*corners, ahead, cell)?;
+                }
             }
         }
-        cut = cutter.cut;
+        cut.ends.push(numbered(cut.points.len()));
     }
     Ok(cut)
 }
@@ -104,6 +120,14 @@ impl Hasher for EdgeHasher {
 /// A map with the global numbers of vertices as keys.
 pub(super) type ByVertices<K> = HashMap<K, u32, BuildHasherDefault<EdgeHasher>>;
 
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a point for each edge of a mesh numbered with 32 bits"
+)]
+fn numbered(point: usize) -> u32 {
+    point as u32
+}
+
 /// The points of a layer by the edges that they lie on: for each vertex a chain of the points on
 /// edges that begin there.
 struct KnownEdges {
@@ -113,19 +137,39 @@ struct KnownEdges {
     heads: Vec<u32>,
     /// For each point the end of its edge, and the point before it in the chain.
     links: Vec<(u32, u32)>,
+    /// Edges that were asked for a short time ago, and their points: neighbours ask for the same,
+    /// and this is small enough to stay near the processor. An edge has one place in it.
+    recent: Vec<([u32; 2], u32)>,
 }
 
 /// There is no further point in a chain.
 const NONE: u32 = u32::MAX;
 
+/// By its bits, how many edges are kept that were asked for a short time ago.
+const RECENT: u32 = 11;
+
 impl KnownEdges {
-    fn new(vertices: usize, first: usize) -> Self {
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a point for each edge of a mesh numbered with 32 bits"
-        )]
-        let first = first as u32;
-        Self { first, heads: vec![NONE; vertices], links: Vec::new() }
+    fn new(vertices: usize) -> Self {
+        let recent = vec![([NONE; 2], NONE); 1 << RECENT];
+        Self { first: 0, heads: vec![NONE; vertices], links: Vec::new(), recent }
+    }
+
+    /// Forgets all edges; the next point has this number.
+    fn begin(&mut self, first: usize) {
+        if !self.links.is_empty() {
+            self.heads.fill(NONE);
+            self.links.clear();
+            self.recent.fill(([NONE; 2], NONE));
+        }
+        self.first = numbered(first);
+    }
+
+    /// The place of an edge among those that were asked for a short time ago.
+    #[inline]
+    fn place(&mut self, [start, end]: [u32; 2]) -> &mut ([u32; 2], u32) {
+        let edge = u64::from(start) << 32 | u64::from(end);
+        let place = edge.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - RECENT);
+        &mut self.recent[place as usize]
     }
 
     fn find(&self, [start, end]: [u32; 2]) -> Option<u32> {
@@ -141,32 +185,56 @@ impl KnownEdges {
     }
 
     /// Adds the next point; returns its number.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a point for each edge of a mesh numbered with 32 bits"
-    )]
     fn add(&mut self, [start, end]: [u32; 2]) -> u32 {
-        let point = self.first + self.links.len() as u32;
+        let point = self.first + numbered(self.links.len());
         let before = std::mem::replace(&mut self.heads[start as usize], point);
         self.links.push((end, before));
         point
     }
 }
 
+/// For each set of corners of a tetrahedron that lie ahead, by bits, the edges that are cut, in
+/// order around, from behind to ahead, and how many: around the corner that lies alone on its side,
+/// or between the edges that two and two make.
+const RINGS: [([[usize; 2]; 4], usize); 16] = rings();
+
+const fn rings() -> [([[usize; 2]; 4], usize); 16] {
+    let mut rings = [([[0; 2]; 4], 0); 16];
+    let mut mask = 1;
+    while mask < 15 {
+        let mut corners = [[0; 4]; 2];
+        let mut counts = [0; 2];
+        let mut corner = 0;
+        while corner < 4 {
+            let side = mask >> corner & 1;
+            corners[side][counts[side]] = corner;
+            counts[side] += 1;
+            corner += 1;
+        }
+        let [[d, e, f, _], [a, b, c, _]] = corners;
+        rings[mask] = match counts[1] {
+            1 => ([[d, a], [e, a], [f, a], [f, a]], 3),
+            2 => ([[d, a], [d, b], [e, b], [e, a]], 4),
+            _ => ([[d, a], [d, b], [d, c], [d, c]], 3),
+        };
+        mask += 1;
+    }
+    rings
+}
+
 struct Cutter<'a, V> {
-    layer: u32,
     /// The function's value at a vertex.
     value: V,
     sides: &'a Sides,
     coordinates: &'a [Vector],
-    known: KnownEdges,
+    known: &'a mut KnownEdges,
     /// The cell's segments: from the edge where the face's boundary leaves the side ahead to that
     /// where it enters it.
     segments: Vec<(u32, u32)>,
     polygon: Vec<u32>,
     /// The cell's points, with the direction from behind to ahead along their edges.
     directions: Vec<(u32, Vector)>,
-    cut: Cut,
+    cut: &'a mut Cut,
 }
 
 impl<V: Fn(usize) -> f64> Cutter<'_, V> {
@@ -176,7 +244,9 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
         self.segments.clear();
         self.directions.clear();
         if let (CellType::Tetra, &[a, b, c, d]) = (cell_type, vertices) {
-            return self.tetrahedron([a, b, c, d], cell);
+            let corners = [a, b, c, d];
+            let ahead = self.sides.of_tetrahedron(corners);
+            return ahead.map_or(Ok(()), |ahead| self.tetrahedron(corners, ahead, cell));
         }
         match cell_type.dimension() {
             3 => {
@@ -196,39 +266,21 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
         }
     }
 
-    /// The polygon of a tetrahedron: around the corner that lies alone on its side, or between the
-    /// edges that two and two make.
-    fn tetrahedron(&mut self, vertices: [u32; 4], cell: usize) -> Result<(), MeshError> {
-        let (mut ahead, mut behind) = ([0; 4], [0; 4]);
-        let (mut ahead_count, mut behind_count) = (0, 0);
-        for vertex in vertices {
-            if self.sides.is_ahead(vertex) {
-                ahead[ahead_count] = vertex;
-                ahead_count += 1;
-            } else {
-                behind[behind_count] = vertex;
-                behind_count += 1;
-            }
+    /// The polygon of a tetrahedron, of which these corners lie ahead, by bits.
+    fn tetrahedron(
+        &mut self,
+        corners: [u32; 4],
+        ahead: usize,
+        cell: usize,
+    ) -> Result<(), MeshError> {
+        let (ring, count) = &RINGS[ahead];
+        let at = corners.map(|vertex| self.coordinates[vertex as usize]);
+        let (mut polygon, mut direction) = ([0; 4], [0.0; 3]);
+        for (point, &[behind, ahead]) in polygon.iter_mut().zip(&ring[..*count]) {
+            *point = self.crossing([corners[behind], corners[ahead]]);
+            direction = add(direction, subtract(at[ahead], at[behind]));
         }
-        let [a, b, c, _] = ahead;
-        let [d, e, f, _] = behind;
-        let (ring, count) = match ahead_count {
-            1 => ([[d, a], [e, a], [f, a], [f, a]], 3),
-            2 => ([[d, a], [d, b], [e, b], [e, a]], 4),
-            _ => ([[d, a], [d, b], [d, c], [d, c]], 3),
-        };
-        let mut polygon = std::mem::take(&mut self.polygon);
-        polygon.clear();
-        let mut direction = [0.0; 3];
-        for edge in &ring[..count] {
-            polygon.push(self.crossing(*edge));
-            let behind = self.coordinates[edge[0] as usize];
-            let ahead = self.coordinates[edge[1] as usize];
-            direction = add(direction, subtract(ahead, behind));
-        }
-        let done = self.push_polygon(&mut polygon, direction, cell);
-        self.polygon = polygon;
-        done
+        self.push_polygon(&mut polygon[..*count], direction, cell)
     }
 
     /// The segments of one face: one for each run of its corners ahead.
@@ -259,12 +311,25 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
     }
 
     /// The number of the point on an edge whose ends lie on two sides.
+    #[inline]
     fn crossing(&mut self, edge: [u32; 2]) -> u32 {
-        let [a, b] = if edge[0] <= edge[1] { edge } else { [edge[1], edge[0]] };
-        // Most edges have their point already, and none of their ends is at 0.
-        if let Some(point) = self.known.find([a, b]) {
+        let edge = if edge[0] <= edge[1] { edge } else { [edge[1], edge[0]] };
+        let (known, point) = *self.known.place(edge);
+        if known == edge {
             return point;
         }
+        let point = match self.known.find(edge) {
+            Some(point) => point,
+            None => self.new_crossing(edge),
+        };
+        *self.known.place(edge) = (edge, point);
+        point
+    }
+
+    /// The number of the point on an edge that has none yet, or has an end at 0.
+    fn new_crossing(&mut self, [a, b]: [u32; 2]) -> u32 {
+        let ends = [a, b].map(|vertex| self.coordinates[vertex as usize]);
+        self.cut.is_broken |= !are_finite(&ends);
         let (at_a, at_b) = ((self.value)(a as usize), (self.value)(b as usize));
         let edge = match (at_a == 0.0, at_b == 0.0) {
             (true, _) => [a, a],
@@ -285,7 +350,6 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
         let at = |axis: usize| crossing.between(from[axis], to[axis]);
         self.cut.points.push([at(0), at(1), at(2)]);
         self.cut.crossings.push(crossing);
-        self.cut.layers.push(self.layer);
         self.known.add(edge)
     }
 
@@ -317,14 +381,12 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
     /// Points that follow on themselves are left out, and what is left without an area.
     fn push_polygon(
         &mut self,
-        polygon: &mut Vec<u32>,
+        polygon: &mut [u32],
         direction: Vector,
         cell: usize,
     ) -> Result<(), MeshError> {
-        polygon.dedup();
-        if polygon.len() > 1 && polygon.first() == polygon.last() {
-            polygon.pop();
-        }
+        let count = without_repeats(polygon);
+        let polygon = &mut polygon[..count];
         if polygon.len() < 3 {
             return Ok(());
         }
@@ -357,3 +419,20 @@ impl<V: Fn(usize) -> f64> Cutter<'_, V> {
         Ok(())
     }
 }
+
+/// Moves the points of a ring that do not follow on themselves to the front; returns how many.
+fn without_repeats(ring: &mut [u32]) -> usize {
+    let mut count = 0;
+    for index in 0..ring.len() {
+        let point = ring[index];
+        if count == 0 || ring[count - 1] != point {
+            ring[count] = point;
+            count += 1;
+        }
+    }
+    // The last is followed by the first.
+    if count > 1 && ring[0] == ring[count - 1] { count - 1 } else { count }
+}
+
+#[cfg(test)]
+mod tests;

@@ -84,9 +84,19 @@ pub(super) fn slacks(
     value: impl Fn(usize, usize) -> f64,
     communicator: &dyn Communicator,
 ) -> Vec<f64> {
-    // `max` passes NaN over.
+    // NaN is above nothing, and is passed over. Several at a time, as no step waits for the one
+    // before: the largest is the same in any order.
+    let larger = |most: f64, value: f64| if value > most { value } else { most };
     let furthest = |index: usize| {
-        (0..vertices).fold(0.0_f64, |most, vertex| most.max(value(index, vertex).abs()))
+        let mut most = [0.0_f64; 8];
+        let whole = vertices - vertices % most.len();
+        for start in (0..whole).step_by(most.len()) {
+            for (lane, most) in most.iter_mut().enumerate() {
+                *most = larger(*most, value(index, start + lane).abs());
+            }
+        }
+        let rest = (whole..vertices).map(|vertex| value(index, vertex).abs());
+        most.into_iter().chain(rest).fold(0.0, larger)
     };
     let mut furthest: Vec<f64> = (0..count).map(furthest).collect();
     communicator.reduce(Reduction::Maximum, &mut furthest);

@@ -60,7 +60,7 @@ pub(super) fn weighted(row: &[(u32, f64)], vectors: &[Vector]) -> Vector {
 
 /// A point between the two ends of an edge, or a vertex where they are one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Crossing {
+pub(crate) struct Crossing {
     /// The ends, the lower number first.
     pub(super) edge: [u32; 2],
     /// How far from the first to the second, 0 to 1.
@@ -87,6 +87,17 @@ pub(super) enum Owners<'a> {
     OfPoints(&'a [u32]),
 }
 
+/// The vectors of an array where they lie in memory as vectors do.
+pub(super) fn lent<'a>(view: &ArrayView<'a>) -> Option<&'a [Vector]> {
+    let values = view.contiguous().filter(|_| view.components() == 3)?;
+    Some(values.as_chunks::<3>().0)
+}
+
+/// Whether all coordinates are finite. Without a branch, which processors do many at a time.
+pub(super) fn are_finite(points: &[Vector]) -> bool {
+    points.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite())
+}
+
 /// The coordinates of these vertices.
 pub(super) fn points(
     points: &ArrayView,
@@ -94,10 +105,9 @@ pub(super) fn points(
     cycle: u64,
 ) -> Result<Vec<Vector>, ExtractError> {
     // As with fields, a slice is read faster than what asks for the type of each number.
-    if let Some(all) = points.contiguous().filter(|_| points.components() == 3) {
-        let (all, _) = all.as_chunks::<3>();
+    if let Some(all) = lent(points) {
         let found: Vec<Vector> = vertices.iter().map(|&vertex| all[vertex as usize]).collect();
-        if found.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite()) {
+        if are_finite(&found) {
             return Ok(found);
         }
     }

@@ -28,8 +28,10 @@ impl Layout {
     pub(crate) fn cells(&self, numbers: &[u32]) -> Result<Cells, MeshError> {
         let mut cells = Cells::new();
         let mut push = |cell_type: CellType, points: &[usize]| {
-            let points: Vec<u32> = points.iter().map(|&point| numbers[point]).collect();
-            if points.contains(&u32::MAX) { Ok(()) } else { cells.push(cell_type, &points) }
+            let mut corners = [0; 8];
+            let corners = &mut corners[..points.len()];
+            corners.iter_mut().zip(points).for_each(|(corner, &point)| *corner = numbers[point]);
+            if corners.contains(&u32::MAX) { Ok(()) } else { cells.push(cell_type, corners) }
         };
         if let Some(lines) = &self.lines {
             for ends in lines.windows(2) {
@@ -44,9 +46,12 @@ impl Layout {
         };
         let strides = [1, counts[0], counts[0] * counts[1]];
         let along: Vec<usize> = (0..3).filter(|&axis| counts[axis] > 1).collect();
-        let is_last =
-            |point: usize, axis: usize| point / strides[axis] % counts[axis] + 1 == counts[axis];
-        for point in (0..self.points).filter(|&p| !along.iter().any(|&axis| is_last(p, axis))) {
+        // The first corners of all cells; along an axis with one point the cells have no length.
+        let firsts = |axis: usize| 0..counts[axis] - usize::from(counts[axis] > 1);
+        let all = firsts(2).flat_map(|k| firsts(1).map(move |j| [j, k]));
+        let all =
+            all.flat_map(|[j, k]| firsts(0).map(move |i| i + j * strides[1] + k * strides[2]));
+        for point in all {
             let at = |steps: &[usize]| {
                 point + steps.iter().map(|&step| strides[along[step]]).sum::<usize>()
             };
@@ -55,10 +60,9 @@ impl Layout {
                 1 => push(CellType::Line, &[point, at(&[0])])?,
                 2 => push(CellType::Quad, &[point, at(&[0]), at(&[0, 1]), at(&[1])])?,
                 _ => {
-                    let bottom = [point, at(&[0]), at(&[0, 1]), at(&[1])];
-                    let all: Vec<usize> =
-                        bottom.iter().copied().chain(bottom.map(|p| p + strides[2])).collect();
-                    push(CellType::Hexahedron, &all)?;
+                    let [a, b, c, d] = [point, at(&[0]), at(&[0, 1]), at(&[1])];
+                    let [e, f, g, h] = [a, b, c, d].map(|corner| corner + strides[2]);
+                    push(CellType::Hexahedron, &[a, b, c, d, e, f, g, h])?;
                 }
             }
         }

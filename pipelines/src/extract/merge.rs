@@ -180,7 +180,7 @@ fn probed(
 pub(super) fn name(whole: &Whole, piece: &Extracted, index: usize) -> Option<(Support, bool)> {
     let numbers = whole.shared.numbers();
     let support = match &piece.origin {
-        Origin::Between(supports) => supports[index],
+        Origin::Between(supports) => supports.of(index),
         Origin::Loose => return None,
         _ => Support::new(&[piece.extract.vertices.as_ref()?[index]], 0),
     };

@@ -6,6 +6,7 @@
 //! [`Source::clip`], [`Source::probe`], [`Source::streamlines`], [`Source::glyphs`] and [`Source::whole`] then make an [`Extract`] of the channel
 //! as it is now. The parts of an extract that depend on the mesh alone stay in a [`Kept`].
 
+mod bins;
 mod blocks;
 mod check;
 mod clip;
@@ -28,6 +29,7 @@ mod skin;
 mod source;
 mod statistics;
 mod streamlines;
+mod supports;
 mod take;
 mod walls;
 

@@ -7,7 +7,8 @@ use tombolo_deform::mesh::{Cells, Vector};
 use super::cut::Cut;
 use super::gather::{self, Crossing, Owners, Points, Rows};
 use super::layout::Layout;
-use super::source::{Extracted, Origin, Support};
+use super::source::{Extracted, Origin};
+use super::supports::Supports;
 use super::{Channel, Extract};
 use tombolo_deform::communicator::Communicator;
 
@@ -53,7 +54,7 @@ pub(super) enum Base {
     /// At these vertices.
     Vertices(Arc<[u32]>),
     /// On edges.
-    Crossings(Vec<Crossing>),
+    Crossings(Arc<Vec<Crossing>>),
     /// Among several vertices.
     Rows(Rows),
     /// In these cells, among or at vertices: the points of a probe.
@@ -80,7 +81,7 @@ impl Pattern {
             Base::Rows(rows) | Base::Probe(_, rows) => rows.bytes(),
         };
         let origin = match &self.origin {
-            Origin::Between(supports) => size_of::<Support>() * supports.len(),
+            Origin::Between(supports) => supports.bytes(),
             _ => 0,
         };
         let cells = self.cells.bytes();
@@ -135,13 +136,10 @@ impl Pattern {
 
 impl From<Cut> for Pattern {
     fn from(cut: Cut) -> Self {
-        let Cut { points, crossings, layers, cells, owners } = cut;
-        let supports = crossings.iter().zip(layers).map(|(crossing, layer)| {
-            let [a, b] = crossing.edge;
-            Support::new(&crossing.edge[usize::from(a == b)..], u64::from(layer))
-        });
+        let Cut { points, crossings, ends, cells, owners, .. } = cut;
+        let crossings = Arc::new(crossings);
         Self {
-            origin: Origin::Between(supports.collect()),
+            origin: Origin::Between(Supports::OnEdges(Arc::clone(&crossings), ends.into())),
             points,
             base: Base::Crossings(crossings),
             cells: Arc::new(cells),

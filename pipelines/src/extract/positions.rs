@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tombolo_deform::mesh::{ArrayView, Vector};
 
 use super::ExtractError;
-use super::gather::point;
+use super::gather::{are_finite, lent, point};
 
 /// The coordinates of a mesh, and a number that is another one whenever they or the cells have
 /// changed.
@@ -40,6 +40,10 @@ impl Positions {
         self.version = next_version();
         self.points.clear();
         self.points.reserve_exact(view.len());
+        if let Some(all) = lent(view).filter(|all| are_finite(all)) {
+            self.points.extend_from_slice(all);
+            return Ok(());
+        }
         for vertex in 0..view.len() {
             match point(view, vertex, cycle) {
                 Ok(point) => self.points.push(point),

@@ -9,6 +9,7 @@ use tombolo_deform::number::real;
 use tombolo_deform::vector::distance;
 
 use super::ExtractError;
+use super::bins::Bins;
 use super::decompose::Faces;
 use super::gather::Rows;
 use super::layout::Layout;
@@ -59,12 +60,11 @@ pub(super) fn pattern(
     let (points, counts) = points(&probe.at);
     let finder = fault.map(|()| Finder::new(source, probe.method));
     let key = keys(source, input);
-    let mut found: Vec<Option<Found>> = match &finder {
-        Ok(finder) => points.iter().map(|point| finder.find(*point, &key)).collect(),
-        Err(_) => vec![None; points.len()],
+    let found = match &finder {
+        Ok(finder) => finder.find_all(&points, key),
+        Err(_) => FoundAll::none(points.len()),
     };
-    let key_of = |found: &Option<Found>| found.as_ref().map_or(u64::MAX, |found| key(found.cell));
-    let own: Vec<u64> = found.iter().map(key_of).collect();
+    let own = &found.keys;
     let mut least = own.clone();
     communicator.reduce_integers(Reduction::Minimum, &mut least);
     finder?;
@@ -83,17 +83,16 @@ pub(super) fn pattern(
     let (mut indices, mut owners, mut taken) = (Vec::new(), Vec::new(), Vec::new());
     let mut numbers = vec![u32::MAX; points.len()];
     for (index, &point) in points.iter().enumerate() {
-        if own[index] != least[index] {
+        if own[index] != least[index] || is_outside(&index) {
             continue;
         }
-        let Some(Found { cell, row }) = found[index].take() else { continue };
         #[expect(clippy::cast_possible_truncation, reason = "a limited number of points")]
         {
             numbers[index] = taken.len() as u32;
             indices.push(index as u32);
         }
-        rows.push(row);
-        owners.push(cell);
+        rows.push(found.rows.row(found.numbers[index]).iter().copied());
+        owners.push(found.cells[index]);
         taken.push(point);
     }
     // Those of several ranks hang together once they are merged.
@@ -127,6 +126,45 @@ pub(super) struct Found {
     pub(super) row: Vec<(u32, f64)>,
 }
 
+/// The cell that each of some points lies in.
+struct FoundAll {
+    /// The key of the cell; `u64::MAX` where there is none.
+    keys: Vec<u64>,
+    cells: Vec<u32>,
+    /// The number of each point's row.
+    numbers: Vec<usize>,
+    /// The vertices that the points' values come from, with their weights.
+    rows: Rows,
+}
+
+impl FoundAll {
+    fn none(points: usize) -> Self {
+        let (keys, rows) = (vec![u64::MAX; points], Rows::default());
+        Self { keys, cells: vec![0; points], numbers: vec![0; points], rows }
+    }
+}
+
+/// The vertices that a point's values come from, with their weights: no more than a cell with
+/// parametric coordinates has.
+#[derive(Clone, Copy)]
+struct Row {
+    entries: [(u32, f64); 8],
+    count: usize,
+}
+
+impl Row {
+    fn new(vertices: &[u32], weights: &[f64]) -> Self {
+        let mut entries = [(0, 0.0); 8];
+        let parts = vertices.iter().copied().zip(weights.iter().copied());
+        entries.iter_mut().zip(parts).for_each(|(entry, part)| *entry = part);
+        Self { entries, count: vertices.len().min(weights.len()) }
+    }
+
+    fn entries(&self) -> &[(u32, f64)] {
+        &self.entries[..self.count]
+    }
+}
+
 /// The own cells of a rank, and which of them a point lies in.
 pub(super) struct Finder<'a> {
     source: &'a Source,
@@ -149,29 +187,71 @@ impl<'a> Finder<'a> {
 
     /// The diagonal of the box around a cell.
     pub(super) fn size(&self, cell: u32) -> f64 {
-        let vertices = self.source.cells().vertices(cell as usize);
-        let at = |&vertex: &u32| self.source.positions.points[vertex as usize];
-        Bounds::around(vertices.iter().map(at)).diagonal()
+        self.search.bounds(self.source, cell).diagonal()
+    }
+
+    /// For each point what [`find`](Self::find) finds. Points alone are sorted, and each cell is
+    /// looked at once: quicker than a tree of all cells, which are more than the points.
+    fn find_all(&self, points: &[Vector], key: impl Fn(u32) -> u64) -> FoundAll {
+        let mut found = FoundAll::none(points.len());
+        let finite = points.iter().copied().zip(0..);
+        let finite = finite.filter(|(point, _)| point.iter().all(|x| x.is_finite()));
+        let bins = Bins::new(&finite.collect::<Vec<(Vector, u32)>>());
+        // Twice, as coordinates are rounded.
+        let (search, slack) = (&*self.search, self.search.slack);
+        let reach = 2.0 * slack;
+        for &cell in &search.cells {
+            let bounds = search.bounds(self.source, cell);
+            let lower = bounds.lower.map(|x| x - reach);
+            let upper = bounds.upper.map(|x| x + reach);
+            bins.near(&Bounds { lower, upper }, &mut |point, number| {
+                let is_beside = (0..3).fold(false, |is_beside, axis| {
+                    is_beside | (point[axis] < lower[axis]) | (point[axis] > upper[axis])
+                });
+                if is_beside || bounds.squared_distance(point) > slack * slack {
+                    return;
+                }
+                let index = number as usize;
+                let key = key(cell);
+                if key < found.keys[index]
+                    && let Some(row) = self.row(cell as usize, point)
+                {
+                    found.keys[index] = key;
+                    found.cells[index] = cell;
+                    found.numbers[index] = found.rows.len();
+                    found.rows.push(row.entries().iter().copied());
+                }
+            });
+        }
+        found
     }
 
     /// Of the cells that a point lies in, that of the lowest key. A point whose coordinates are not
     /// finite lies in none.
     pub(super) fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
-        let mut candidates = self.search.around(point);
+        let mut candidates = self.search.around(self.source, point);
         candidates.sort_unstable_by_key(|&cell| key(cell));
-        let found = |cell: u32| self.row(cell as usize, point).map(|row| Found { cell, row });
-        let mut found = candidates.into_iter().find_map(found)?;
-        if self.method == ProbeMethod::Nearest {
-            let vertices = self.source.cells().vertices(found.cell as usize);
-            let from = |vertex: u32| distance(self.source.positions.points[vertex as usize], point);
-            let nearest = vertices.iter().copied().min_by(|&a, &b| from(a).total_cmp(&from(b)))?;
-            found.row = vec![(nearest, 1.0)];
+        let found = |cell: u32| {
+            let row = self.row(cell as usize, point)?;
+            Some(Found { cell, row: row.entries().to_vec() })
+        };
+        candidates.into_iter().find_map(found)
+    }
+
+    /// The vertices that the values at a point in a cell come from; `None` where it lies beside.
+    fn row(&self, cell: usize, point: Vector) -> Option<Row> {
+        let row = self.interpolated(cell, point)?;
+        if self.method == ProbeMethod::Interpolated {
+            return Some(row);
         }
-        Some(found)
+        let from = |vertex: u32| distance(self.source.positions.points[vertex as usize], point);
+        let vertices = self.source.cells().vertices(cell).iter().copied();
+        let nearest = vertices.min_by(|&a, &b| from(a).total_cmp(&from(b)))?;
+        Some(Row::new(&[nearest], &[1.0]))
     }
 
     /// The weights of a cell's vertices at a point in it.
-    fn row(&self, cell: usize, point: Vector) -> Option<Vec<(u32, f64)>> {
+    fn interpolated(&self, cell: usize, point: Vector) -> Option<Row> {
         let cells = self.source.cells();
         let (cell_type, vertices) = (cells.cell_type(cell), cells.vertices(cell));
         if shape(cell_type, [0.0; 3]).is_some() {
@@ -186,12 +266,7 @@ impl<'a> Finder<'a> {
         })
     }
 
-    fn within(
-        &self,
-        cell_type: CellType,
-        vertices: &[u32],
-        point: Vector,
-    ) -> Option<Vec<(u32, f64)>> {
+    fn within(&self, cell_type: CellType, vertices: &[u32], point: Vector) -> Option<Row> {
         let mut points = [[0.0; 3]; 8];
         for (slot, &vertex) in points.iter_mut().zip(vertices) {
             *slot = self.source.positions.points[vertex as usize];
@@ -201,7 +276,9 @@ impl<'a> Finder<'a> {
         if is_beside || !is_inside(cell_type, at, SLACK) {
             return None;
         }
-        let shape = shape(cell_type, at)?;
-        Some(vertices.iter().copied().zip(shape.weights().iter().copied()).collect())
+        Some(Row::new(vertices, shape(cell_type, at)?.weights()))
     }
 }
+
+#[cfg(test)]
+mod tests;

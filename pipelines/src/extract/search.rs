@@ -1,5 +1,7 @@
 //! A rank's own cells in a tree of boxes, by which those that a point lies in are found.
 
+use std::sync::OnceLock;
+
 use tombolo_deform::bounds::{Bounds, BoxTree};
 use tombolo_deform::mesh::Vector;
 
@@ -16,8 +18,9 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The own cells of a rank that have an inside, where they are now.
 #[derive(Debug)]
 pub(super) struct Search {
-    cells: Vec<u32>,
-    tree: BoxTree,
+    pub(super) cells: Vec<u32>,
+    /// The tree of their boxes, once a point is looked for by itself.
+    tree: OnceLock<BoxTree>,
     /// How far beside a cell a point may lie, in units of the mesh.
     pub(super) slack: f64,
 }
@@ -25,32 +28,50 @@ pub(super) struct Search {
 impl Search {
     pub(super) fn new(source: &Source) -> Self {
         let (cells, points) = (source.cells(), &source.positions.points);
-        #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
-        let own: Vec<u32> = (0..cells.len())
-            .filter(|&cell| {
-                cells.cell_type(cell).dimension() >= 2 && source.counts(Association::Element, cell)
-            })
-            .map(|cell| cell as u32)
-            .collect();
-        let bounds = |&cell: &u32| {
-            let vertices = cells.vertices(cell as usize);
-            Bounds::around(vertices.iter().map(|&vertex| points[vertex as usize]))
-        };
-        let boxes: Vec<Bounds> = own.iter().map(bounds).collect();
-        let all = boxes.iter().fold(Bounds::EMPTY, |all, bounds| all.join(bounds));
+        let mut own = Vec::with_capacity(cells.len());
+        let mut is_used = vec![false; points.len()];
+        for (cell, (cell_type, vertices)) in (0..).zip(cells.iter()) {
+            if cell_type.dimension() >= 2 && source.counts(Association::Element, cell as usize) {
+                own.push(cell);
+                vertices.iter().for_each(|&vertex| is_used[vertex as usize] = true);
+            }
+        }
+        let used = points.iter().zip(&is_used).filter(|(_, is_used)| **is_used);
+        let all = Bounds::around(used.map(|(point, _)| *point));
         // In a face that lies far from the origin, what lies in it is rounded by more.
         let largest =
             all.corners().as_flattened().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         let slack = (SLACK * all.diagonal()).max(ROUNDING * largest);
         let slack = if own.is_empty() { 0.0 } else { slack };
-        Self { cells: own, tree: BoxTree::new(&boxes), slack }
+        Self { cells: own, tree: OnceLock::new(), slack }
     }
 
     /// The cells whose boxes a point lies in, but for rounding.
-    pub(super) fn around(&self, point: Vector) -> Vec<u32> {
+    pub(super) fn around(&self, source: &Source, point: Vector) -> Vec<u32> {
+        let tree = self.tree.get_or_init(|| {
+            let boxes: Vec<Bounds> =
+                self.cells.iter().map(|&cell| self.bounds(source, cell)).collect();
+            BoxTree::new(&boxes)
+        });
         let mut around = Vec::new();
-        self.tree.around(point, self.slack, |index| around.push(self.cells[index as usize]));
+        tree.around(point, self.slack, |index| around.push(self.cells[index as usize]));
         around
+    }
+
+    /// The box around a cell.
+    pub(super) fn bounds(&self, source: &Source, cell: u32) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for &vertex in source.cells().vertices(cell as usize) {
+            let point = source.positions.points[vertex as usize];
+            // All are numbers, so that a look at which is smaller is enough.
+            let smaller = |a: f64, b: f64| if a < b { a } else { b };
+            let larger = |a: f64, b: f64| if a > b { a } else { b };
+            bounds = Bounds {
+                lower: std::array::from_fn(|axis| smaller(point[axis], bounds.lower[axis])),
+                upper: std::array::from_fn(|axis| larger(point[axis], bounds.upper[axis])),
+            };
+        }
+        bounds
     }
 }
 

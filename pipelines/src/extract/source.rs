@@ -14,6 +14,7 @@ use super::layout::Layout;
 use super::pattern::Input;
 use super::positions::Positions;
 use super::search::Search;
+use super::supports::Supports;
 use super::{Association, Channel, Extract, ExtractError, ExtractFeatures, Field, GHOST_FIELD};
 use tombolo_deform::communicator::{Communicator, agree};
 use tombolo_deform::distributed::{DistributedError, Part, PartBoundary};
@@ -43,7 +44,7 @@ pub(crate) enum Origin {
     /// Other vertices.
     Vertices,
     /// Between vertices.
-    Between(Arc<[Support]>),
+    Between(Supports),
     /// Points that no other rank has, as of glyphs.
     Loose,
     /// The points of a probe, by their numbers there.

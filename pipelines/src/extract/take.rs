@@ -7,9 +7,9 @@ use tombolo_deform::mesh::{NumberType, Vector, ghosts};
 
 use super::blocks::{Sides, Within};
 use super::clip::Clipper;
-use super::cut::cut;
+use super::cut::{Cut, cut};
 use super::function::{Function, settled, slacks};
-use super::gather::check_length;
+use super::gather::{self, check_length};
 use super::pattern::{Base, Input, Kept, Pattern};
 use super::probe;
 use super::source::{Extracted, Origin, Source};
@@ -43,24 +43,34 @@ impl Source {
             let value = |index: usize, vertex: usize| functions[index].value(points[vertex]);
             let slacks = slacks(functions.len(), points.len(), value, input.communicator);
             fault?;
-            source.cut(&slacks, value)
+            Ok(source.cut(points, &slacks, value)?.into())
         })
     }
 
     /// The surfaces on which a vertex field has given values, cut out as a slice is; they are
-    /// counter-clockwise seen from where the field is larger. Collective.
+    /// counter-clockwise seen from where the field is larger. Coordinates are looked at where the
+    /// surfaces are. Collective.
     ///
     /// # Errors
     /// [`ExtractError::UnknownField`], [`ExtractError::NotOfVertices`] or
     /// [`ExtractError::DecidingNotFinite`], and as [`slice`](Self::slice).
     pub fn contour(&mut self, input: &Input, contour: &Contour) -> Result<Extracted, ExtractError> {
-        let values = self.update(input).and_then(|()| self.vertex_values(input, &contour.field));
+        // Nothing is kept for another step, so that it need not be known whether the mesh has
+        // moved.
+        let lent = gather::lent(&input.channel.mesh.points);
+        let fault = if lent.is_some() { Ok(()) } else { self.update(input) };
+        let values = fault.and_then(|()| self.vertex_values(input, &contour.field));
         let known = values.as_deref().unwrap_or_default();
         let levels = &contour.values;
         let value = |index: usize, vertex: usize| known[vertex] - levels[index];
         let slacks = slacks(levels.len(), known.len(), value, input.communicator);
         values.as_ref().map_err(Clone::clone)?;
-        Ok(self.cut(&slacks, value)?.fill_once(input))
+        let cut = self.cut(lent.unwrap_or(&self.positions.points), &slacks, value)?;
+        if cut.is_broken {
+            // This names the vertex.
+            self.update(input)?;
+        }
+        Ok(Pattern::from(cut).fill_once(input))
     }
 
     /// The cells in which a field keeps to a range, whole, with their fields. Collective.
@@ -72,13 +82,12 @@ impl Source {
         input: &Input,
         threshold: &Threshold,
     ) -> Result<Extracted, ExtractError> {
-        self.update(input)?;
         let keeps = |value: f64| {
             threshold.min.is_none_or(|min| value >= min)
                 && threshold.max.is_none_or(|max| value <= max)
         };
         let Some(view) = self.field(input, &threshold.field)? else {
-            return Ok(self.whole_cells(Vec::new())?.fill_once(input));
+            return Ok(self.whole_cells(input, Vec::new())?.fill_once(input));
         };
         if view.association == Association::Mesh {
             let (field, association) = (view.name.to_owned(), view.association);
@@ -99,7 +108,7 @@ impl Source {
         };
         #[expect(clippy::cast_possible_truncation, reason = "cells are numbered with 32 bits")]
         let cells = (0..self.cells().len() as u32).filter(is_in).collect();
-        Ok(self.whole_cells(cells)?.fill_once(input))
+        Ok(self.whole_cells(input, cells)?.fill_once(input))
     }
 
     /// The part of the mesh on one side of a surface. Cells that are cut become tetrahedra,
@@ -276,13 +285,13 @@ impl Source {
     /// Cuts with functions, of which each has its slack; `value` is that of one at a vertex.
     fn cut(
         &self,
+        points: &[Vector],
         slacks: &[f64],
         value: impl Fn(usize, usize) -> f64,
-    ) -> Result<Pattern, ExtractError> {
+    ) -> Result<Cut, ExtractError> {
         let counts = |cell: usize| self.counts(Association::Element, cell);
         let value = |index: usize, vertex: usize| settled(value(index, vertex), slacks[index]);
-        let points = &self.positions.points;
-        Ok(cut(self.cells(), self.blocks(), points, slacks.len(), value, counts)?.into())
+        Ok(cut(self.cells(), self.blocks(), points, slacks.len(), value, counts)?)
     }
 
     /// Clips with functions, as [`cut`](Self::cut) cuts.
@@ -316,12 +325,12 @@ impl Source {
     }
 
     /// These cells, with the vertices that they have.
-    fn whole_cells(&self, owners: Vec<u32>) -> Result<Pattern, ExtractError> {
-        let points = &self.positions.points;
+    fn whole_cells(&self, input: &Input, owners: Vec<u32>) -> Result<Pattern, ExtractError> {
+        let points = &input.channel.mesh.points;
         let cells = self.cells().subset(owners.iter().map(|&cell| cell as usize));
         let (cells, vertices) = cells.compact(points.len());
         Ok(Pattern {
-            points: vertices.iter().map(|&vertex| points[vertex as usize]).collect(),
+            points: gather::points(points, &vertices, input.cycle)?,
             cells: Arc::new(cells),
             base: Base::Vertices(vertices.into()),
             owners: owners.into(),
@@ -402,3 +411,6 @@ impl Source {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,5 @@
 //! Raising the quality of the cells of a valid mesh beyond the guard's floor.
 
-mod attempt;
 mod simplices;
 mod sweep;
 #[cfg(test)]
@@ -12,8 +11,8 @@ use super::colours::{Held, colours};
 use crate::communicator::{Communicator, Halo};
 use crate::mesh::{Domain, Numbering, Ordered, Vector};
 use crate::topology::{Groups, marked};
-use attempt::Attempt;
 use simplices::simplices;
+use sweep::Sweeps;
 
 /// Vertices stay where none of their cells has lost more than this part of its quality.
 const GOOD: f64 = 0.95;
@@ -25,30 +24,26 @@ const GOOD: f64 = 0.95;
 /// is *worn* where it has less than 0.95 of it.
 ///
 /// 1. A mesh without worn cells stays, and so does one with a cell turned inside out.
-/// 2. The mesh is *enough* where no cell is below 0.8, or below the worst of the cells that cannot
-///    be moved, whose quality the mesh keeps whatever the others gain. Where it is not, the few
-///    vertices that have a cell below that, or hardly above it, are swept through until it is.
-/// 3. Then it is the mean that counts. The vertices of one colour are swept through, and what came
-///    of it is looked at: where the mean gains less than a whole sweep would that adds a thousandth
-///    to each worn cell, the mesh stays as it was before. So it is after most orders, whose solve
-///    has spread what was asked for over all cells: what lifts the least a little costs the others
-///    as much. Else there are sweeps through the vertices of all worn cells while they gain as
-///    much. So there are where the second step does not come to its end.
-/// 4. A sweep goes through its vertices a colour after the other: vertices of one colour share no
-///    cell, and move at the same time, on all threads. Each vertex goes down
+/// 2. It is *enough* where no cell is below 0.8, or below the worst of the cells that cannot be
+///    moved, whose quality the mesh keeps whatever the others gain. Then the vertices of one colour
+///    are swept through, and what came of it is looked at: where the mean gains less than a whole
+///    sweep would that adds a thousandth to each worn cell, the mesh stays as it was. So it is after
+///    most orders, whose solve has spread what was asked for over all cells: what lifts the least a
+///    little costs the others as much.
+/// 3. Else there are sweeps through the vertices of worn cells, a colour after the other: vertices
+///    of one colour share no cell, and move at the same time, on all threads. Each vertex goes down
 ///
 ///    `Σ (δ / (q - τ))² - 0.01 ln q`
 ///
 ///    over the corners `q` of its cells (a corner's determinant by the product of its edges) by one
 ///    step of Newton's method with a line search both ways. The barrier `τ` stands `δ` below the
 ///    least `q` of the mesh and rises with it from sweep to sweep, so that the worst cells are
-///    lifted first and all others gain as far as these let them. A vertex whose cells are all good
-///    is asleep until a neighbour moves: it would stay, and is not looked at.
-/// 5. Sweeps of step 2 end after as many as are allowed, or where one lifts the least quality by
-///    less than a fiftieth of what that has to rise. Those of step 3 end after as many, or where one
-///    was not worth it: where the mesh is enough and the mean gains too little, or where it is not
-///    and neither the mean nor the least quality rises by a millionth. A sweep that has raised
-///    neither the mean nor the least quality of the mesh is taken back.
+///    lifted first and all others gain as far as these let them.
+/// 4. A vertex without worn cells is asleep until a neighbour moves: it would stay, and is not
+///    looked at.
+/// 5. Sweeps end after as many as are allowed, or where one was not worth it: where it is enough as
+///    in step 2, else where neither the mean nor the least quality rises by a millionth. It is taken
+///    back where it has raised neither the mean nor the least quality of the mesh.
 ///
 /// L. Freitag, C. Ollivier-Gooch (*Tetrahedral mesh improvement using swapping and smoothing*,
 /// 1997) show why one vertex at a time is enough where a mesh is nearly good: what a linear solve
@@ -182,20 +177,38 @@ impl Improver {
         {
             return false;
         }
-        let near = self.numbering.gather(points).into_owned();
+        let mut near = self.numbering.gather(points).into_owned();
         let before = self.qualities(&near);
         let least = before.least;
         if sweeps == 0 || least.is_nan() || least <= 0.0 || least >= self.good {
             return false;
         }
-        let mut attempt = Attempt::new(self, near, before, sweeps);
-        if self.untiring {
-            attempt.sweep_on();
-        } else {
-            attempt.lift_least();
-            attempt.raise_mean();
+        let fixed = self.least_fixed(&near);
+        let sweeping = Sweeps::new(self);
+        // The points of the last sweep that has gained something; a rank may have none to move.
+        let (mut kept, mut has_gained) = (Vec::new(), false);
+        let (mut last, mut tried) = (before, 0);
+        if !self.untiring && before.are_enough(fixed) {
+            tried = self.colours.len().min(1);
+            sweeping.through(&mut near, 0..tried, least);
+            let part = 1.0 / self.colours.len().max(1) as f64;
+            if !self.qualities(&near).are_worth_more(&before, fixed, part) {
+                return false;
+            }
         }
-        let Attempt { kept, last, has_gained, .. } = attempt;
+        for _ in 0..sweeps {
+            sweeping.through(&mut near, tried..self.colours.len(), last.least);
+            tried = 0;
+            let now = self.qualities(&near);
+            let worth = self.untiring || now.are_worth_more(&last, fixed, 1.0);
+            if worth || now.are_better(&last, fixed) {
+                kept.clone_from(&near);
+                (last, has_gained) = (now, true);
+            }
+            if !worth {
+                break;
+            }
+        }
         let better = has_gained && last.least >= least;
         if better {
             self.numbering.scatter(&kept, points);

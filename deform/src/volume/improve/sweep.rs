@@ -13,8 +13,6 @@ use crate::volume::colours::Held;
 
 /// How many vertices are moved at a time.
 const VERTICES: usize = 64;
-/// How many simplices are looked at at a time.
-const SIMPLICES: usize = 4096;
 
 /// How far below the least quality the barrier stands, as a part of what that has lost (of this
 /// much at least).
@@ -24,9 +22,7 @@ const LOST: f64 = 0.05;
 /// The sweeps of one improvement.
 pub(super) struct Sweeps<'a> {
     improver: &'a Improver,
-    /// Vertices none of whose cells is below this stay.
-    good: f64,
-    /// The vertices that may have a cell below it. One without falls asleep when it is looked at, and
+    /// The vertices that may have a worn cell. One without falls asleep when it is looked at, and
     /// wakes when a neighbour moves: what is left out would have stayed. While one colour is gone
     /// through, its own vertices fall asleep and those of other colours wake, so that the marks do
     /// not depend on who is first.
@@ -34,37 +30,15 @@ pub(super) struct Sweeps<'a> {
 }
 
 impl<'a> Sweeps<'a> {
-    /// Sweeps through the vertices of `points` that have a cell below `good`, and their neighbours
-    /// where these get one.
-    pub(super) fn about(improver: &'a Improver, points: &[Vector], good: f64) -> Self {
+    pub(super) fn new(improver: &'a Improver) -> Self {
         let vertices = improver.incident.offsets.len() - 1;
-        let awake: Vec<AtomicBool> = (0..vertices).map(|_| AtomicBool::new(false)).collect();
-        parallel::map_chunks(improver.movable.len(), SIMPLICES, |range| {
-            for &simplex in &improver.movable[range] {
-                let simplex = &improver.simplices[simplex as usize];
-                // Not by a hair's breadth: what looks at the vertex computes it in another way.
-                if simplex.least(points) < good * (1.0 + 1e-9) {
-                    let wake = |vertex: u32| awake[vertex as usize].store(true, Ordering::Relaxed);
-                    simplex.vertices.into_iter().for_each(wake);
-                }
-            }
-        });
-        Self { improver, good, awake }
+        Self { improver, awake: (0..vertices).map(|_| AtomicBool::new(true)).collect() }
     }
 
-    /// Sweeps that begin with all vertices.
-    #[cfg(test)]
-    pub(super) fn of_all(improver: &'a Improver, good: f64) -> Self {
-        let vertices = improver.incident.offsets.len() - 1;
-        let awake = (0..vertices).map(|_| AtomicBool::new(true)).collect();
-        Self { improver, good, awake }
-    }
-
-    /// How many of the free vertices sleep.
+    /// How many vertices sleep.
     #[cfg(test)]
     pub(super) fn asleep(&self) -> usize {
-        let sleeps = |&&vertex: &&u32| !self.awake[vertex as usize].load(Ordering::Relaxed);
-        self.improver.colours.iter().flatten().filter(sleeps).count()
+        self.awake.iter().filter(|awake| !awake.load(Ordering::Relaxed)).count()
     }
 
     /// Sweeps through the vertices of some colours, with the barrier below the `least` quality.
@@ -91,12 +65,11 @@ impl<'a> Sweeps<'a> {
                 }
                 let point = points[vertex as usize];
                 self.gather(vertex, points, &mut star);
-                let derivatives = barrier.derivatives(point, &star, self.good);
-                if derivatives.is_good {
+                if star.is_above(point, self.improver.good) {
                     self.awake[vertex as usize].store(false, Ordering::Relaxed);
                     continue;
                 }
-                let position = barrier.improved(point, &star, &derivatives);
+                let position = barrier.improved(point, &star);
                 if position != point {
                     self.wake(vertex);
                     moved.push((vertex, position));
@@ -120,10 +93,9 @@ impl<'a> Sweeps<'a> {
         for &(entry, vertex) in &vertices {
             let point = points[vertex as usize];
             self.gather(vertex, points, &mut star);
-            let Derivatives { gradient, hessian, is_good, .. } =
-                barrier.derivatives(point, &star, self.good);
+            let Derivatives { gradient, hessian, .. } = barrier.derivatives(point, &star);
             let slope = &mut slopes[entry as usize];
-            slope[0] = f64::from(u8::from(!is_good));
+            slope[0] = f64::from(u8::from(!star.is_above(point, self.improver.good)));
             slope[1..4].copy_from_slice(&gradient);
             slope[4..].copy_from_slice(hessian.as_flattened());
         }

@@ -17,9 +17,6 @@ const GAIN: f64 = 1e-3;
 /// The least gain in the mean or the least quality while that is still too low; less is rounding.
 const REST: f64 = 1e-6;
 
-/// The least gain in the least quality, by what that has to rise, while few vertices can lift it.
-const STALL: f64 = 0.02;
-
 /// The quality of what can be moved, on all ranks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Qualities {
@@ -54,27 +51,17 @@ impl Qualities {
     pub(super) fn are_worth_more(&self, before: &Self, fixed: f64, part: f64) -> bool {
         let gain = (self.sum - before.sum) / before.worn.max(1.0);
         gain >= part * GAIN
-            || !before.are_enough(fixed) && (gain >= REST || self.rise(before, fixed))
+            || !before.are_enough(fixed) && gain.max(self.rise(before, fixed)) >= REST
     }
 
     /// Whether the mesh is better by these than by those `before`.
     pub(super) fn are_better(&self, before: &Self, fixed: f64) -> bool {
-        self.sum > before.sum || self.rise(before, fixed)
+        self.sum > before.sum || self.rise(before, fixed) >= REST
     }
 
-    /// Whether the least quality of the mesh has risen, whose cells that cannot be moved have
+    /// By how much the least quality of the mesh has risen, whose cells that cannot be moved have
     /// `fixed`.
-    pub(super) fn rise(&self, before: &Self, fixed: f64) -> bool {
-        self.risen(before, fixed) >= REST
-    }
-
-    /// Whether the least quality has risen by so much of what was left that a few vertices lift it.
-    pub(super) fn lift(&self, before: &Self, fixed: f64) -> bool {
-        let wanted = STALL * (fixed.min(ENOUGH) - before.least);
-        self.risen(before, fixed) >= wanted.max(REST)
-    }
-
-    fn risen(&self, before: &Self, fixed: f64) -> f64 {
+    fn rise(&self, before: &Self, fixed: f64) -> f64 {
         self.least.min(fixed) - before.least.min(fixed)
     }
 }
