@@ -59,6 +59,7 @@ mod momentum;
 pub mod partition;
 pub mod parts;
 pub mod program;
+mod program_error;
 pub mod ranks;
 pub mod report;
 pub mod saved;

@@ -5,31 +5,26 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use tombolo::communicator::{Communicator, RankError, Solo};
-use tombolo::{
-    Adaptor, ExecuteError, FinalizeError, InitializeError, JournalError, Restart, Settings, Step,
-    Stopper,
-};
-use tombolo_deform::distributed::DistributedError;
+use tombolo::communicator::{Communicator, Solo};
+use tombolo::{Adaptor, FinalizeError, Restart, Settings, Step, Stopper};
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::linear::{BuiltIn, Solvers};
-use tombolo_deform::mesh::{Mesh, MeshError, NumberType, Vector};
-use tombolo_deform::surface::{Surface, SurfaceError};
+use tombolo_deform::mesh::{Mesh, NumberType, Vector};
+use tombolo_deform::surface::Surface;
 use tombolo_pipelines::extract::{Association, Channel, Field, FieldView};
-use tombolo_pipelines::files::{self, Compression, FileError};
-use tombolo_pipelines::language::{
-    Config, Listen, ReadError, Recording, StreamServer, TimedCommand,
-};
+use tombolo_pipelines::files::{self, Compression};
+use tombolo_pipelines::language::{Config, Listen, Recording, StreamServer, TimedCommand};
 
-use crate::case::{Case, CaseError};
+use crate::Patch;
+use crate::case::Case;
 use crate::folder::make_folder_of;
 use crate::history::{History, Through};
 use crate::parts::{Dealing, Share};
+pub use crate::program_error::ProgramError;
 use crate::ranks::agreed;
 use crate::report::{FlowReport, MeshReport, Report, Unwritten};
-use crate::saved::{self, State, StateError};
+use crate::saved::{self, State};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
-use crate::{Patch, SolverError};
 
 /// By which part of its volume a fluid may be stretched before that is told.
 const STRETCH: f64 = 1e-6;
@@ -63,59 +58,6 @@ pub struct Options {
     pub dealing: Dealing,
     /// How the equations are solved.
     pub solves: SolverSettings,
-}
-
-/// Why a run could not be done, or ended early.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProgramError {
-    /// The case makes no sense.
-    #[error(transparent)]
-    Case(#[from] CaseError),
-    /// A file cannot be read or written.
-    #[error("{}: {source}", file.display())]
-    File {
-        /// The file.
-        file: PathBuf,
-        /// Why not.
-        source: std::io::Error,
-    },
-    /// A file of pipelines or orders cannot be read, or makes no sense.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// The mesh cannot be read, or the result not written.
-    #[error(transparent)]
-    Mesh(#[from] FileError),
-    /// The mesh has no boundary to speak of.
-    #[error(transparent)]
-    Surface(#[from] SurfaceError),
-    /// The flow cannot be solved.
-    #[error(transparent)]
-    Solver(#[from] SolverError),
-    /// The state of a run cannot be saved or gone on from.
-    #[error(transparent)]
-    State(#[from] StateError),
-    /// The adaptor could not be set up.
-    #[error(transparent)]
-    Initialize(#[from] InitializeError),
-    /// The adaptor was called wrongly.
-    #[error(transparent)]
-    Execute(#[from] ExecuteError),
-    /// The adaptor could not write everything.
-    #[error(transparent)]
-    Finalize(#[from] FinalizeError),
-    /// The journal of the run could not be written.
-    #[error(transparent)]
-    Journal(#[from] JournalError),
-    /// A mesh that is none.
-    #[error(transparent)]
-    Points(#[from] MeshError),
-    /// The mesh cannot be dealt out to the ranks.
-    #[error(transparent)]
-    Distributed(#[from] DistributedError),
-    /// Something is wrong on one rank. All ranks have this error.
-    #[error(transparent)]
-    Rank(#[from] RankError),
 }
 
 /// A run that has been set up.

@@ -12,7 +12,7 @@ use tombolo::{OrderReport, PipelineReport, Spread};
 
 use crate::folder::make_folder_of;
 use crate::history::Through;
-use crate::program::ProgramError;
+use crate::program_error::ProgramError;
 use crate::ranks::agreed;
 use crate::solver::{Solver, StepOutcome};
 

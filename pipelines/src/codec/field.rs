@@ -6,8 +6,9 @@ use super::exact::{self, Precision};
 use super::grid::{Grid, MOST_STEPS};
 use super::hierarchy::Hierarchy;
 use super::mask::Mask;
-use super::plane::{Around, Shift, Values, Wanted, two_to};
+use super::plane::{Shift, Values, Wanted, two_to};
 use super::ranges::ranges;
+use super::run::Around;
 
 /// By how much a finite value may differ after it was coded.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,11 +5,11 @@ use tombolo_deform::lanes::with_wide_registers;
 
 use super::CodecError;
 use super::bytes::{Input, put_count};
-use super::hierarchy::{BLOCK, Hierarchy};
+use super::hierarchy::BLOCK;
 use super::node::Node;
 use super::prediction::sums_of;
 use super::rans::{Decoder, Numbers, encode};
-use super::run::{CLASSES, Run};
+use super::run::{Around, CLASSES, Run};
 use super::tables::TABLES;
 use super::temporal::{Modes, SPACE, Ways, cheapest};
 
@@ -26,20 +26,6 @@ const TABLE_PRICE: f32 = 9.0;
 pub(super) struct Plane {
     pub(super) nodes: Vec<Node>,
     tables: [u8; CLASSES],
-}
-
-/// Everything that goes with a plane.
-#[derive(Clone, Copy)]
-pub(super) struct Around<'a> {
-    pub(super) hierarchy: &'a Hierarchy,
-    /// The points whose values are known without.
-    pub(super) mask: Option<&'a [bool]>,
-    /// The component before this one.
-    pub(super) beside: Option<&'a [Node]>,
-    /// Grid steps in a step of the difference.
-    pub(super) step: f32,
-    /// Whether the frame goes on from earlier ones.
-    pub(super) follows: bool,
 }
 
 /// The values that a plane is to hold, place after place.

@@ -4,9 +4,8 @@
 
 use std::ops::Range;
 
-use super::hierarchy::BLOCK;
+use super::hierarchy::{BLOCK, Hierarchy};
 use super::node::Node;
-use super::plane::Around;
 use super::prediction::{Coefficients, predict};
 
 /// The number of contexts.
@@ -19,6 +18,20 @@ const MOST: f32 = 64.0;
 /// The weights of the last frame's difference and of the preceding component's.
 const LAST: f32 = 20.0;
 const BESIDE: f32 = 12.0;
+
+/// Everything that goes with a plane.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    pub(super) hierarchy: &'a Hierarchy,
+    /// The points whose values are known without.
+    pub(super) mask: Option<&'a [bool]>,
+    /// The component before this one.
+    pub(super) beside: Option<&'a [Node]>,
+    /// Grid steps in a step of the difference.
+    pub(super) step: f32,
+    /// Whether the frame goes on from earlier ones.
+    pub(super) follows: bool,
+}
 
 /// The class of each sum of magnitudes, which is a whole number below 2¹³.
 static CLASS: [u8; 1 << 13] = {

@@ -10,7 +10,8 @@ use super::cut::{ByVertices, mixed};
 use super::decompose::Faces;
 use super::gather::Rows;
 use super::pattern::{Base, Pattern};
-use super::source::{Origin, Support};
+use super::source::Origin;
+use super::supports::Support;
 use super::supports::Supports;
 
 /// A vertex, or a point that was cut out.

@@ -11,7 +11,8 @@ use tombolo_deform::number::real;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
 use super::gather::{Rows, weighted};
-use super::pattern::{Base, Input, Pattern};
+use super::input::Input;
+use super::pattern::{Base, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
 use super::{Association, ExtractError};

@@ -5,7 +5,8 @@ use std::{collections::HashMap, sync::Arc};
 use tombolo_deform::mesh::{CellType, Cells, NumberType, Vector};
 
 use super::layout::Layout;
-use super::source::{Origin, Support, Whole};
+use super::source::{Origin, Whole};
+use super::supports::Support;
 use super::{ABSENT, Association, Extract, Extracted, Field, is_absent};
 use tombolo_deform::communicator::{Communicator, Garbled, Reader, Writer, agree};
 use tombolo_deform::distributed::DistributedError;

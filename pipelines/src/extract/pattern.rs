@@ -4,26 +4,13 @@ use std::sync::Arc;
 
 use tombolo_deform::mesh::{Cells, Vector};
 
+use super::Extract;
 use super::cut::Cut;
 use super::gather::{self, Crossing, Owners, Points, Rows};
+use super::input::Input;
 use super::layout::Layout;
 use super::source::{Extracted, Origin};
 use super::supports::Supports;
-use super::{Channel, Extract};
-use tombolo_deform::communicator::Communicator;
-
-/// The input of a source stage.
-#[derive(Clone, Copy)]
-pub struct Input<'a> {
-    /// The channel at this step.
-    pub channel: &'a Channel<'a>,
-    /// The step.
-    pub cycle: u64,
-    /// Whether a field of this name is wanted.
-    pub wanted: &'a dyn Fn(&str) -> bool,
-    /// The ranks that have parts of the mesh.
-    pub communicator: &'a dyn Communicator,
-}
 
 /// The part of one stage's extract that depends on the mesh alone, kept until the mesh moves.
 #[derive(Debug, Default)]

@@ -12,9 +12,10 @@ use super::ExtractError;
 use super::bins::Bins;
 use super::decompose::Faces;
 use super::gather::Rows;
+use super::input::Input;
 use super::layout::Layout;
-use super::pattern::{Base, Input, Pattern};
-use super::search::{SLACK, Search};
+use super::pattern::{Base, Pattern};
+use super::search::{self, SLACK, Search};
 use super::source::{Origin, Source};
 use crate::interpolation::{is_inside, locate, shape};
 use crate::language::{Probe, ProbeAt, ProbeGrid, ProbeLine, ProbeMethod};
@@ -175,8 +176,7 @@ pub(super) struct Finder<'a> {
 impl<'a> Finder<'a> {
     /// A finder that is needed once for the mesh as it lies.
     pub(super) fn new(source: &'a Source, method: ProbeMethod) -> Self {
-        let search = source.kept_search().unwrap_or_else(|| Arc::new(Search::new(source)));
-        Self { source, method, search }
+        Self { source, method, search: source.search_once() }
     }
 
     /// A finder that is needed at each step, as long as the mesh does not move.
@@ -185,9 +185,14 @@ impl<'a> Finder<'a> {
         Self { source, method: ProbeMethod::Interpolated, search }
     }
 
+    /// The box around a cell.
+    fn bounds(&self, cell: u32) -> Bounds {
+        search::bounds(self.source.cells(), &self.source.positions.points, cell)
+    }
+
     /// The diagonal of the box around a cell.
     pub(super) fn size(&self, cell: u32) -> f64 {
-        self.search.bounds(self.source, cell).diagonal()
+        self.bounds(cell).diagonal()
     }
 
     /// For each point what [`find`](Self::find) finds. Points alone are sorted, and each cell is
@@ -201,7 +206,7 @@ impl<'a> Finder<'a> {
         let (search, slack) = (&*self.search, self.search.slack);
         let reach = 2.0 * slack;
         for &cell in &search.cells {
-            let bounds = search.bounds(self.source, cell);
+            let bounds = self.bounds(cell);
             let lower = bounds.lower.map(|x| x - reach);
             let upper = bounds.upper.map(|x| x + reach);
             bins.near(&Bounds { lower, upper }, &mut |point, number| {
@@ -229,7 +234,8 @@ impl<'a> Finder<'a> {
     /// Of the cells that a point lies in, that of the lowest key. A point whose coordinates are not
     /// finite lies in none.
     pub(super) fn find(&self, point: Vector, key: &dyn Fn(u32) -> u64) -> Option<Found> {
-        let mut candidates = self.search.around(self.source, point);
+        let mut candidates =
+            self.search.around(self.source.cells(), &self.source.positions.points, point);
         candidates.sort_unstable_by_key(|&cell| key(cell));
         let found = |cell: u32| {
             let row = self.row(cell as usize, point)?;

@@ -3,10 +3,7 @@
 use std::sync::OnceLock;
 
 use tombolo_deform::bounds::{Bounds, BoxTree};
-use tombolo_deform::mesh::Vector;
-
-use super::Association;
-use super::source::Source;
+use tombolo_deform::mesh::{Cells, Vector};
 
 /// How far beside a cell a point may lie that is in it but for rounding: in parametric coordinates,
 /// and in diagonals of the cells' bounding box.
@@ -26,12 +23,12 @@ pub(super) struct Search {
 }
 
 impl Search {
-    pub(super) fn new(source: &Source) -> Self {
-        let (cells, points) = (source.cells(), &source.positions.points);
+    /// Of cells and their points as they are now; `counts` says which are this rank's own.
+    pub(super) fn new(cells: &Cells, points: &[Vector], counts: impl Fn(usize) -> bool) -> Self {
         let mut own = Vec::with_capacity(cells.len());
         let mut is_used = vec![false; points.len()];
         for (cell, (cell_type, vertices)) in (0..).zip(cells.iter()) {
-            if cell_type.dimension() >= 2 && source.counts(Association::Element, cell as usize) {
+            if cell_type.dimension() >= 2 && counts(cell as usize) {
                 own.push(cell);
                 vertices.iter().for_each(|&vertex| is_used[vertex as usize] = true);
             }
@@ -47,32 +44,32 @@ impl Search {
     }
 
     /// The cells whose boxes a point lies in, but for rounding.
-    pub(super) fn around(&self, source: &Source, point: Vector) -> Vec<u32> {
+    pub(super) fn around(&self, cells: &Cells, points: &[Vector], point: Vector) -> Vec<u32> {
         let tree = self.tree.get_or_init(|| {
             let boxes: Vec<Bounds> =
-                self.cells.iter().map(|&cell| self.bounds(source, cell)).collect();
+                self.cells.iter().map(|&cell| bounds(cells, points, cell)).collect();
             BoxTree::new(&boxes)
         });
         let mut around = Vec::new();
         tree.around(point, self.slack, |index| around.push(self.cells[index as usize]));
         around
     }
+}
 
-    /// The box around a cell.
-    pub(super) fn bounds(&self, source: &Source, cell: u32) -> Bounds {
-        let mut bounds = Bounds::EMPTY;
-        for &vertex in source.cells().vertices(cell as usize) {
-            let point = source.positions.points[vertex as usize];
-            // All are numbers, so that a look at which is smaller is enough.
-            let smaller = |a: f64, b: f64| if a < b { a } else { b };
-            let larger = |a: f64, b: f64| if a > b { a } else { b };
-            bounds = Bounds {
-                lower: std::array::from_fn(|axis| smaller(point[axis], bounds.lower[axis])),
-                upper: std::array::from_fn(|axis| larger(point[axis], bounds.upper[axis])),
-            };
-        }
-        bounds
+/// The box around a cell.
+pub(super) fn bounds(cells: &Cells, points: &[Vector], cell: u32) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for &vertex in cells.vertices(cell as usize) {
+        let point = points[vertex as usize];
+        // All are numbers, so that a look at which is smaller is enough.
+        let smaller = |a: f64, b: f64| if a < b { a } else { b };
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        bounds = Bounds {
+            lower: std::array::from_fn(|axis| smaller(point[axis], bounds.lower[axis])),
+            upper: std::array::from_fn(|axis| larger(point[axis], bounds.upper[axis])),
+        };
     }
+    bounds
 }
 
 #[cfg(test)]
@@ -83,10 +80,8 @@ mod tests {
     use tombolo_deform::distributed::Part;
     use tombolo_deform::shapes::box_of_tets;
 
-    use crate::extract::{Channel, FieldView, Input};
+    use crate::extract::{Channel, FieldView, Input, Source};
     use crate::language::{Glyphs, Streamlines};
-
-    use super::*;
 
     /// What a line or a glyph stands in is looked for in one tree until the mesh moves.
     #[test]

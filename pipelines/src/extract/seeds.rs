@@ -6,8 +6,8 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::number::real;
 use tombolo_deform::vector::{add, length, mean, polygon_normal, scale, subtract};
 
+use super::input::Input;
 use super::merge::merged;
-use super::pattern::Input;
 use super::probe::points;
 use super::source::Source;
 use super::{Extract, ExtractError, unknown_feature};

@@ -9,7 +9,8 @@ use tombolo_deform::mesh::ghosts;
 
 use super::merge::{merged, name};
 use super::skin::{Faces, Outside};
-use super::source::{Origin, Support, Whole};
+use super::source::{Origin, Whole};
+use super::supports::Support;
 use super::{Association, Extract, Extracted, Field, GHOST_FIELD};
 
 /// The part of an extract that one rank shows.

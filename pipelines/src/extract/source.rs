@@ -10,8 +10,8 @@ use tombolo_deform::surface::{Surface, SurfaceError};
 
 use super::blocks::Blocks;
 use super::gather::{self, Owners, Points};
+use super::input::Input;
 use super::layout::Layout;
-use super::pattern::Input;
 use super::positions::Positions;
 use super::search::Search;
 use super::supports::Supports;
@@ -49,43 +49,6 @@ pub(crate) enum Origin {
     Loose,
     /// The points of a probe, by their numbers there.
     Probe(Layout, Arc<[u32]>),
-}
-
-/// A point that was cut out, known by the vertices between which it lies and by what cut it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct Support {
-    /// Up to four vertices, rising; `u32::MAX` where there is none.
-    pub(crate) vertices: [u32; 4],
-    /// Distinguishes it from other points between these vertices.
-    pub(crate) layer: u64,
-}
-
-impl Support {
-    /// The point between these vertices, at most four.
-    pub(crate) fn new(vertices: &[u32], layer: u64) -> Self {
-        let mut all = [u32::MAX; 4];
-        all.iter_mut().zip(vertices).for_each(|(slot, vertex)| *slot = *vertex);
-        all.sort_unstable();
-        Self { vertices: all, layer }
-    }
-
-    /// The point between its vertices and those of another, together at most four.
-    pub(crate) fn with(&self, other: &Self, layer: u64) -> Self {
-        let mut all = [u32::MAX; 8];
-        let mut count = 0;
-        for vertex in self.vertices().chain(other.vertices()) {
-            if !all[..count].contains(&vertex) {
-                all[count] = vertex;
-                count += 1;
-            }
-        }
-        Self::new(&all[..count], layer)
-    }
-
-    /// Its vertices.
-    pub(crate) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
-        self.vertices.iter().copied().filter(|&vertex| vertex != u32::MAX)
-    }
 }
 
 impl Extracted {
@@ -418,12 +381,17 @@ impl Source {
 
     /// The tree in which points are looked for, kept until the mesh moves.
     pub(super) fn search(&self) -> &Arc<Search> {
-        self.search.get_or_init(|| Arc::new(Search::new(self)))
+        self.search.get_or_init(|| Arc::new(self.new_search()))
     }
 
-    /// That tree, where it was made already.
-    pub(super) fn kept_search(&self) -> Option<Arc<Search>> {
-        self.search.get().cloned()
+    /// That tree where it was made already, else one that is not kept.
+    pub(super) fn search_once(&self) -> Arc<Search> {
+        self.search.get().cloned().unwrap_or_else(|| Arc::new(self.new_search()))
+    }
+
+    fn new_search(&self) -> Search {
+        let counts = |cell: usize| self.counts(Association::Element, cell);
+        Search::new(self.cells(), &self.positions.points, counts)
     }
 
     /// Takes note of where the vertices are now.

@@ -17,8 +17,9 @@ use tombolo_deform::vector::{distance, length};
 
 use super::ExtractError;
 use super::gather::{Rows, weighted};
+use super::input::Input;
 use super::layout::Layout;
-use super::pattern::{Base, Input, Pattern};
+use super::pattern::{Base, Pattern};
 use super::probe::{Finder, Found, keys};
 use super::source::{Origin, Source};
 use crate::language::{Direction, Streamlines};

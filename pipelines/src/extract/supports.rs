@@ -3,7 +3,43 @@
 use std::sync::Arc;
 
 use super::gather::Crossing;
-use super::source::Support;
+
+/// A point that was cut out, known by the vertices between which it lies and by what cut it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Support {
+    /// Up to four vertices, rising; `u32::MAX` where there is none.
+    pub(crate) vertices: [u32; 4],
+    /// Distinguishes it from other points between these vertices.
+    pub(crate) layer: u64,
+}
+
+impl Support {
+    /// The point between these vertices, at most four.
+    pub(crate) fn new(vertices: &[u32], layer: u64) -> Self {
+        let mut all = [u32::MAX; 4];
+        all.iter_mut().zip(vertices).for_each(|(slot, vertex)| *slot = *vertex);
+        all.sort_unstable();
+        Self { vertices: all, layer }
+    }
+
+    /// The point between its vertices and those of another, together at most four.
+    pub(crate) fn with(&self, other: &Self, layer: u64) -> Self {
+        let mut all = [u32::MAX; 8];
+        let mut count = 0;
+        for vertex in self.vertices().chain(other.vertices()) {
+            if !all[..count].contains(&vertex) {
+                all[count] = vertex;
+                count += 1;
+            }
+        }
+        Self::new(&all[..count], layer)
+    }
+
+    /// Its vertices.
+    pub(crate) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        self.vertices.iter().copied().filter(|&vertex| vertex != u32::MAX)
+    }
+}
 
 /// The supports of points.
 #[derive(Debug, Clone)]

@@ -10,7 +10,8 @@ use super::clip::Clipper;
 use super::cut::{Cut, cut};
 use super::function::{Function, settled, slacks};
 use super::gather::{self, check_length};
-use super::pattern::{Base, Input, Kept, Pattern};
+use super::input::Input;
+use super::pattern::{Base, Kept, Pattern};
 use super::probe;
 use super::source::{Extracted, Origin, Source};
 use super::{
