@@ -141,6 +141,8 @@ const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }
     if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
   }
 });
+/** Whether the browser has taken away what draws the picture. */
+let isLost = false;
 const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   bars: (shown) => {
     shownBars = shown;
@@ -164,7 +166,7 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
-  lost: (isLost) => showEmpty(...(isLost ? LOST : emptyText(store.state))),
+  lost: (gone) => { isLost = gone; sayEmpty(); },
 });
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
@@ -437,7 +439,10 @@ function emptyText({ frames, connection: { state, explanation }, hello, end }: S
   if (hello && hello.views.length === 0) return ["Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage."];
   return ["Connected", "The first picture appears when the simulation has taken its next step."];
 }
-store.watch(emptyText, ([title, text]) => showEmpty(title, text), sameJson);
+function sayEmpty(): void {
+  showEmpty(...(isLost ? LOST : emptyText(store.state)));
+}
+store.watch(emptyText, sayEmpty, sameJson);
 
 part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });

@@ -68,7 +68,8 @@ impl Queue {
     }
 
     /// Puts a command into the queue and calls `tell` before the solver's thread can take it from
-    /// there: who hears of a command finds it in the queue, and hears nothing else of it before.
+    /// there: who hears of a command finds it in the queue, and hears nothing else of it before. The
+    /// queue is locked meanwhile: nothing that `tell` locks may be held by who comes here.
     pub(crate) fn push_and_tell(&self, received: Received, tell: impl FnOnce()) {
         let mut waiting = lock(&self.waiting);
         waiting.push_back(received);

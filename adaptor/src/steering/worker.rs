@@ -130,6 +130,11 @@ impl Jobs {
         }
     }
 
+    /// Whether the plan of this number is still the one under way.
+    fn are_at(&self, number: u64) -> bool {
+        lock(&self.state).at_plan == Some(number)
+    }
+
     /// Gives up whatever is under way, and what will be asked for from now on.
     pub(crate) fn give_up(&self) {
         self.change(|state| {
@@ -273,7 +278,14 @@ impl Drop for Worker {
 fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queue) {
     while let Some(job) = jobs.next() {
         let done = match job {
-            Job::Plan(number, asked) => Done::Planned(number, Box::new(lock(planner).plan(&asked))),
+            Job::Plan(number, asked) => {
+                let mut planner = lock(planner);
+                // It was cancelled while another thread made a plan.
+                if !jobs.are_at(number) {
+                    continue;
+                }
+                Done::Planned(number, Box::new(planner.plan(&asked)))
+            }
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
             Job::Forecast(Question { asked, answer, .. }) => {
                 let forecast = lock(planner).forecast(&asked);

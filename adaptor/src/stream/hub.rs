@@ -238,7 +238,8 @@ impl Hub {
 
     /// Returns once a viewer is connected, or the run is to stop.
     pub(crate) fn wait_for_viewer(&self, mut is_to_stop: impl FnMut() -> bool) {
-        while lock(&self.state).clients.is_empty() && !is_to_stop() {
+        let is_alone = || lock(&self.state).clients.is_empty();
+        while is_alone() && !is_to_stop() {
             std::thread::sleep(LOOK_AGAIN);
         }
     }

@@ -115,7 +115,8 @@ impl<B: Boxed> BoxTree<B> {
                 for position in self.positions(leaf) {
                     let square = self.items[position].bounds().squared_distance(point);
                     let (index, (least, lowest)) = (self.order[position], best.get());
-                    if square < least || square == least && index < lowest {
+                    let is_less = square < least || square == least && index < lowest;
+                    if is_less && square.is_finite() {
                         best.set((square, index));
                     }
                 }

@@ -1,7 +1,7 @@
 //! The flow step by step, as a table.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tombolo_pipelines::files::write_durably;
@@ -64,7 +64,7 @@ pub(crate) struct History {
     before: Option<String>,
     /// The seconds that it goes on from.
     seconds: f64,
-    lines: Option<BufWriter<File>>,
+    lines: Option<File>,
 }
 
 impl History {
@@ -110,30 +110,28 @@ impl History {
     ) -> Result<(), (PathBuf, io::Error)> {
         let Through { mass_in, mass_out, pressure_drop } = through;
         let seconds = self.seconds + seconds;
+        let line = format!("{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}\n");
+        // At once: a run may be watched through it, may be ended by force, and goes on where a disk is
+        // full.
         self.begin()
-            .and_then(|lines| {
-                writeln!(
-                    lines,
-                    "{cycle},{time},{pressure_drop},{mass_in},{mass_out},{seconds:.6}"
-                )?;
-                // A run may be watched through it, and may be ended by force.
-                lines.flush()
-            })
+            .and_then(|lines| lines.write_all(line.as_bytes()))
             .map_err(|error| (self.file.clone(), error))
     }
 
     /// The end of the file, which is begun where it has not been.
-    fn begin(&mut self) -> io::Result<&mut BufWriter<File>> {
+    fn begin(&mut self) -> io::Result<&mut File> {
         let lines = match self.lines.take() {
             Some(lines) => lines,
             None => match &self.before {
                 Some(before) => {
                     write_durably(&self.file, |out| out.write_all(before.as_bytes()))?;
-                    BufWriter::new(OpenOptions::new().append(true).open(&self.file)?)
+                    let lines = OpenOptions::new().append(true).open(&self.file)?;
+                    self.before = None;
+                    lines
                 }
                 None => {
-                    let mut lines = BufWriter::new(File::create(&self.file)?);
-                    writeln!(lines, "{HEADER}")?;
+                    let mut lines = File::create(&self.file)?;
+                    lines.write_all(format!("{HEADER}\n").as_bytes())?;
                     lines
                 }
             },

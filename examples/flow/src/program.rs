@@ -1,5 +1,6 @@
 //! The program `flow`: a case, steered through the adaptor.
 
+use std::mem::replace;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,6 +80,7 @@ pub struct Run {
     flow: FlowReport,
     /// Whether the flow is written step by step: by the first rank, and measured by all.
     has_history: bool,
+    has_told_stretch: bool,
     history: Option<History>,
     unwritten: Unwritten,
 }
@@ -190,6 +192,7 @@ impl Run {
             points,
             flow: FlowReport::default(),
             has_history: options.history.is_some(),
+            has_told_stretch: false,
             history,
             unwritten: Unwritten::default(),
             out: options.out.clone(),
@@ -321,12 +324,12 @@ impl Run {
                 self.worst.min_scaled_jacobian =
                     self.worst.min_scaled_jacobian.min(shape.min_scaled_jacobian);
             }
-            let was_stretched = self.flow.stretch.abs() > STRETCH;
             self.flow.count(&outcome, &self.solver);
-            if self.flow.stretch.abs() > STRETCH && !was_stretched && self.communicator.rank() == 0
-            {
+            let tells =
+                self.flow.stretch.abs() > STRETCH && !replace(&mut self.has_told_stretch, true);
+            if tells && self.communicator.rank() == 0 {
                 eprintln!(
-                    "flow: cycle {}: nothing can flow out or in, but the volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
+                    "flow: cycle {}: the domain has no outlet, but its volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
                     step.cycle, self.flow.stretch
                 );
             }

@@ -436,7 +436,8 @@ fn in_order(values: &[f64], components: usize, order: &[u32]) -> Vec<f64> {
     }
 }
 
-/// The same of tuples of so many values, each of which is looked up once.
+/// The values of tuples of so many, place after place, one component after the other; each is looked
+/// up once.
 fn in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32]) -> Vec<f64> {
     let mut ordered = vec![0.0; COMPONENTS * order.len()];
     let mut lists = ordered.chunks_exact_mut(order.len().max(1));

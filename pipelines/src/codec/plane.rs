@@ -95,8 +95,8 @@ impl Plane {
         }
     }
 
-    /// The same, and gives the nodes the next values, as near as single precision has them: to choose
-    /// a way of prediction by.
+    /// Makes the last frame the one before, and gives the nodes the next values, as near as single
+    /// precision has them: to choose a way of prediction by.
     pub(super) fn shift_to(&mut self, shift: Shift, wanted: &Wanted<'_>) {
         let per_unit = two_to(-i32::from(wanted.exponent));
         for (node, value) in self.nodes.iter_mut().zip(wanted.values) {
@@ -108,8 +108,9 @@ impl Plane {
         }
     }
 
-    /// Codes the next frame of these values, which the nodes have if it goes on. Returns the places whose values come out further off
-    /// than they may: those that are not finite, or beyond every step.
+    /// Codes the next frame of these values, which the nodes have already where the frame goes on.
+    /// Returns the places whose values come out further off than they may: those that are not finite,
+    /// or beyond every step.
     pub(super) fn encode(
         &mut self,
         around: Around<'_>,

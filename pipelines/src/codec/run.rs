@@ -49,7 +49,8 @@ static CLASS: [u8; 1 << 13] = {
 };
 
 /// The nearest whole number, the even one of two; by adding and subtracting a number that has no
-/// digits behind the point. Beyond 2²², where it would have to be even, it is even.
+/// digits behind the point. Beyond 2²² it is even, and below -2²²
+/// halves stay: the same on both sides.
 #[inline(always)]
 fn nearest(value: f32) -> f32 {
     const WHOLE: f32 = 12_582_912.0;

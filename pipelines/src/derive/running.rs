@@ -24,8 +24,9 @@ pub(crate) struct Running {
     restored: Option<(Association, usize)>,
 }
 
-/// A length of time, and what the field did in it: what no measure asks for is empty. Where the field
-/// is NaN once, so is all of that block: it has one length, not one for each entity.
+/// A length of time, and what the field did in it: what no measure asks for is empty. Where an
+/// entity is NaN once, its sums of the whole block are: a block has one length, not one for each
+/// entity.
 #[derive(Debug, Default)]
 struct Block {
     length: f64,

@@ -11,8 +11,7 @@ use super::decompose::Faces;
 use super::gather::Rows;
 use super::pattern::{Base, Pattern};
 use super::source::Origin;
-use super::supports::Support;
-use super::supports::Supports;
+use super::supports::{Support, Supports};
 
 /// A vertex, or a point that was cut out.
 #[derive(Clone, Copy)]

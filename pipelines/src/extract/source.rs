@@ -86,9 +86,10 @@ pub struct Source {
     pub(super) boundary: Option<Boundary>,
     /// The blocks of the cells, once something was cut.
     blocks: OnceLock<Blocks>,
-    /// Its cells as they lie now, once points were looked for in them at a step.
+    /// Its own cells as they lie now, with the tree in which points are looked for in them, once
+    /// that was done at a step.
     search: OnceLock<Arc<Search>>,
-    /// Where the vertices were when something was last cut.
+    /// Where the vertices were when that was last taken note of.
     pub(super) positions: Positions,
     /// The knowledge that sets own cells apart from others: on several ranks, and where there are
     /// ghosts.

@@ -58,15 +58,17 @@ impl Source {
     pub fn contour(&mut self, input: &Input, contour: &Contour) -> Result<Extracted, ExtractError> {
         // Nothing is kept for another step, so that it need not be known whether the mesh has
         // moved.
-        let lent = gather::lent(&input.channel.mesh.points);
-        let fault = if lent.is_some() { Ok(()) } else { self.update(input) };
-        let values = fault.and_then(|()| self.vertex_values(input, &contour.field));
+        let points = match gather::lent(&input.channel.mesh.points) {
+            Some(all) => Cow::Borrowed(all),
+            None => Cow::Owned(input.channel.mesh.points.to_vectors()),
+        };
+        let values = self.vertex_values(input, &contour.field);
         let known = values.as_deref().unwrap_or_default();
         let levels = &contour.values;
         let value = |index: usize, vertex: usize| known[vertex] - levels[index];
         let slacks = slacks(levels.len(), known.len(), value, input.communicator);
         values.as_ref().map_err(Clone::clone)?;
-        let cut = self.cut(lent.unwrap_or(&self.positions.points), &slacks, value)?;
+        let cut = self.cut(&points, &slacks, value)?;
         if cut.is_broken {
             // This names the vertex.
             self.update(input)?;

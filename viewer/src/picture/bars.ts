@@ -53,7 +53,9 @@ export class ScalarBars {
         const typed = ends.map((input, i) => cells[i]!.untouched() ?? (input.value.trim() === "" ? shown.range[i]! : readNumber(input.value)));
         ends.forEach((input, i) => markWrong(input, typed[i] === null ? whyNoNumber(input.value) : "", HINT));
         const [low, high] = typed as [number | null, number | null];
-        if (low !== null && high !== null && low < high) shown.typed([low, high]);
+        if (low === null || high === null) return;
+        if (low < high) shown.typed([low, high]);
+        else markWrong(ends[1], "must be more than the lowest value", HINT);
       },
     });
     const ends: [HTMLInputElement, HTMLInputElement] = [end(), end()];

@@ -17,7 +17,12 @@ export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): 
     remembered.add(memory);
     const now = look.visible || look.range.kind === "over time" ? layer.takeScalars() : null;
     const key = colourKey(look);
-    if (key === null || !now) continue;
+    if (key === null) continue;
+    if (!now) {
+      // Where no value is a number any range shows that.
+      if (look.visible) layer.paint([0, 1]);
+      continue;
+    }
     const group = groups.get(key) ?? { look, members: [] };
     groups.set(key, group);
     group.members.push({ key: memory, now, isSeen: look.visible, layer });

@@ -20,6 +20,7 @@ const LONGEST_ERRORS = 50;
 /** Enough to know the time of a picture that is half a minute old, at ten words a second. */
 const LONGEST_PROGRESS = 300;
 const LONGEST_GAPS = 20;
+const LONGEST_CARRIED = 200;
 /** Without a connection nobody is known to be there. */
 const NOBODY: Pick<State, "people" | "followedBy" | "following"> = { people: [], followedBy: 0, following: false };
 
@@ -170,7 +171,9 @@ function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | 
 }
 
 function withCarried(state: State, view: string, fields: readonly FieldInformation[]): State {
-  const next = { ...state, carried: { ...state.carried, [view]: fields } };
+  // A view whose pipeline is gone may come back; not as many as there may be in a long run.
+  const others = Object.entries(state.carried).filter(([name]) => name !== view).slice(-LONGEST_CARRIED);
+  const next = { ...state, carried: { ...Object.fromEntries(others), [view]: fields } };
   return next.hello ? { ...next, ...viewsOf(next, next.hello) } : next;
 }
 

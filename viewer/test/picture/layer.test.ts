@@ -6,6 +6,8 @@ import type { DataFrame, TopologyFrame } from "../../src/connection/protocol";
 import { mapped } from "../../src/picture/colour";
 import { Layer } from "../../src/picture/layer";
 import type { Piece } from "../../src/picture/layer";
+import { Ranges } from "../../src/picture/ranges";
+import { colour } from "../../src/picture/shared-colours";
 import { firstLook } from "../../src/store/looks";
 
 const POINTS = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0];
@@ -122,6 +124,12 @@ describe("colours", () => {
   it("of no number are grey", () => {
     show(frame(1, [0, 1, 2, NaN]));
     expect((parts.surface.mapper.getLookupTable() as unknown as { getNanColor(): number[] }).getNanColor()).toEqual([0.5, 0.5, 0.5, 1]);
+    const isGrey = (): boolean[] => [...parts.surface.data.getPointData().getScalars().getData()].map(Number.isNaN);
+    expect(isGrey()).toEqual([false, false, false, true]);
+    // Where there is none at all, nothing of the frame before is left.
+    expect(layer.setData(frame(2, [NaN, NaN, NaN, NaN]))).toBeNull();
+    colour([layer], new Ranges(), false);
+    expect(isGrey()).toEqual([true, true, true, true]);
   });
 
   it("show no number as such with logarithms, and what is too small as the smallest", () => {

@@ -152,11 +152,14 @@ impl Projection {
     /// Counts the iterations of a solve, to see whether the preconditioner still serves: beside
     /// solves that began alike.
     fn count(&mut self, start: Start, iterations: usize) {
+        let most = self.usual_iterations.iter().copied().max().unwrap_or(0);
         let usual = &mut self.usual_iterations[start as usize];
         if !self.is_stale {
             *usual = (*usual).max(iterations);
-        } else if *usual > 0 {
-            self.is_worn = iterations > *usual + *usual / 2 + 2;
+        } else {
+            // Where none has begun alike, the hardest of the others says what is usual.
+            let usual = if *usual > 0 { *usual } else { most };
+            self.is_worn = iterations > usual + usual / 2 + 2;
         }
     }
 

@@ -56,6 +56,9 @@ fn a_vertex_whose_coordinates_are_not_finite_is_named_where_it_is_come_by() {
             let found = taken(ArrayView::vectors(&points));
             if vertex == far {
                 assert_eq!(found.unwrap(), expected, "{name}");
+                let single: Vec<f32> = points.as_flattened().iter().map(|&x| x as f32).collect();
+                let found = taken(ArrayView::interleaved(Values::F32(&single), 3).unwrap());
+                assert_eq!(found.unwrap(), expected, "{name}");
                 continue;
             }
             let error = found.unwrap_err();
