@@ -1,24 +1,36 @@
 //! The example in Rust, run as a newcomer runs it.
 
+use std::path::Path;
 use std::process::Command;
 
-use serde_json::json;
+use serde_json::{Value, json};
 use tombolo_tests::{programs, succeed};
+
+/// The regions at the top and at the floor of the box.
+fn ends() -> [Value; 2] {
+    [(0.99, 1), (0.01, -1)]
+        .map(|(z, up)| json!({"half_space": {"origin": [0, 0, z], "normal": [0, 0, up]}}))
+}
+
+/// The output of the example, run in a folder for so many steps.
+fn heat(folder: &Path, pipelines: &Value, steps: &str) -> String {
+    let config = json!({"version": 1, "steering": {"background": false}, "pipelines": pipelines});
+    std::fs::write(folder.join("pipelines.json"), config.to_string()).expect("a file");
+    let mut program = Command::new(programs().join("examples/heat"));
+    succeed(program.current_dir(folder).args(["pipelines.json", steps]))
+}
 
 /// The box is pressed flat while it is heated: what is written holds the shape and the heat, both
 /// in closed form.
 #[test]
 fn the_box_is_heated_and_pressed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [above, below] = [(0.99, 1), (0.01, -1)]
-        .map(|(z, up)| json!({"half_space": {"origin": [0, 0, z], "normal": [0, 0, up]}}));
-    let config = json!({"version": 1, "steering": {"background": false}, "pipelines": [
+    let [above, below] = ends();
+    let pipelines = json!([
         {"name": "solid", "every": {"steps": 4}, "stages": [{"write": {"file": "solid-{cycle:1}.vtu"}}]},
         {"name": "press", "at": {"cycle": 2}, "stages": [
-            {"translate": {"region": above, "fixed_region": below, "by": [0, 0, -0.2]}}, {"order": {}}]}]});
-    std::fs::write(folder.path().join("pipelines.json"), config.to_string()).expect("a file");
-    let mut program = Command::new(programs().join("examples/heat"));
-    let told = succeed(program.current_dir(folder.path()).args(["pipelines.json", "9"]));
+            {"translate": {"region": above, "fixed_region": below, "by": [0, 0, -0.2]}}, {"order": {}}]}]);
+    let told = heat(folder.path(), &pipelines, "9");
     // Nine steps of a thousandth, in which the cold of the floor comes no further than to the
     // middle.
     assert_eq!(told, "1 orders, warmest 0.009000\n");
@@ -47,15 +59,12 @@ fn the_box_is_heated_and_pressed() {
 #[test]
 fn a_box_that_is_pressed_flat_stays_finite() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [above, below] = [(0.99, 1), (0.01, -1)]
-        .map(|(z, up)| json!({"half_space": {"origin": [0, 0, z], "normal": [0, 0, up]}}));
-    let config = json!({"version": 1, "steering": {"background": false}, "pipelines": [
+    let [above, below] = ends();
+    let pipelines = json!([
         {"name": "press", "at": {"cycle": 2}, "stages": [
             {"translate": {"region": above, "fixed_region": below, "by": [0, 0, -0.5]}},
-            {"order": {"schedule": {"steps": 20}}}]}]});
-    std::fs::write(folder.path().join("pipelines.json"), config.to_string()).expect("a file");
-    let mut program = Command::new(programs().join("examples/heat"));
-    let told = succeed(program.current_dir(folder.path()).args(["pipelines.json", "600"]));
+            {"order": {"schedule": {"steps": 20}}}]}]);
+    let told = heat(folder.path(), &pipelines, "600");
     let warmest = told.trim().strip_prefix("1 orders, warmest ").and_then(|it| it.parse().ok());
     // Heated at 1, cold below and insulated above: half of the square of the height in the end.
     assert!(warmest.is_some_and(|warmest: f64| (warmest - 0.125).abs() < 2e-3), "{told}");

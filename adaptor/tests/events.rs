@@ -157,8 +157,6 @@ fn viewers_commands_and_checkpoints_are_told_with_their_run() {
     solver.step();
     viewer.send(&json!({"id": "x", "order": squeeze(0.2)}));
     viewer.wait_for("order", |order| order["id"] == "x");
-    // It is in the queue a moment after that is told.
-    std::thread::sleep(std::time::Duration::from_millis(500));
     viewer.send(&json!({"id": "y", "cancel": {"order": "x"}}));
     viewer.send(&json!({"id": "p", "pause": {}}));
     viewer.send(&json!({"id": "r", "resume": {}}));

@@ -55,12 +55,12 @@ const HEADER: &str = "cycle,time,pressure_drop,mass_in,mass_out,seconds";
 /// A file of comma-separated values that gets one line for each step: the state at its end, and the
 /// seconds since the run began.
 ///
-/// What is in the file stays there until the first step: a run that does not come so far has nothing
-/// to put in its place.
+/// An existing file keeps its content until the first step, so that a run that fails before it loses
+/// nothing.
 #[derive(Debug)]
 pub(crate) struct History {
     file: PathBuf,
-    /// What the file begins with, where it is a table that goes on.
+    /// The lines of an earlier run that this table goes on from.
     before: Option<String>,
     /// The seconds that it goes on from.
     seconds: f64,

@@ -32,9 +32,9 @@
 //!   differences of nodal values.
 //! - Mass: where there is an outlet, the flux of the velocity through the whole boundary is 0 to the
 //!   tolerance of the pressure solve, in every step, walls that move included. Without one, what the
-//!   mesh gains or loses in volume stretches the fluid ([`StepOutcome::stretch`]). No pressure is prescribed strongly,
-//!   so that the equation of continuity is tested with every shape function, those at the outlet
-//!   included. Within the domain it holds weakly.
+//!   mesh gains or loses in volume stretches the fluid ([`StepOutcome::stretch`]). No pressure is
+//!   prescribed strongly, so that the equation of continuity is tested with every shape function,
+//!   those at the outlet included. Within the domain it holds weakly.
 //! - The same bits whatever the number of threads. On several ranks the same bits each time; the
 //!   preconditioners depend on the parts, so that from one number of ranks to another fields agree
 //!   to the tolerances of the solves.

@@ -158,7 +158,7 @@ fn is_one_of_several() -> bool {
     let said = |name: &str| std::env::var(name).ok();
     let size =
         ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"].into_iter().find_map(said);
-    // What starts processes by PMIx does not say how many there are.
+    // A launcher that uses PMIx alone does not tell the number of processes.
     size.is_some_and(|size| size != "1") || said("PMIX_RANK").is_some_and(|rank| rank != "0")
 }
 

@@ -33,29 +33,29 @@ pub fn agreed<T, E: ToString + From<RankError>>(
 #[must_use]
 pub fn threads(communicator: &dyn Communicator) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let own = place();
+    let own = affinity();
     share_of(cores, &own, &communicator.gather_all(&own))
 }
 
-/// The share of the cores at a place of ranks, where ranks are at all these places.
+/// The share of one rank of the cores that it may run on, by its affinity and that of all ranks.
 ///
 /// ```
 /// use tombolo_flow::ranks::share_of;
 ///
 /// // Two that are bound to cores of their own, and two that are not, on another machine.
-/// let places = ["one 0-7", "one 8-15", "two 0-15", "two 0-15"];
-/// assert_eq!(share_of(8, &places[0], &places), 8);
-/// assert_eq!(share_of(16, &places[2], &places), 8);
-/// assert_eq!(share_of(1, &places[3], &places), 1);
+/// let affinities = ["one 0-7", "one 8-15", "two 0-15", "two 0-15"];
+/// assert_eq!(share_of(8, &affinities[0], &affinities), 8);
+/// assert_eq!(share_of(16, &affinities[2], &affinities), 8);
+/// assert_eq!(share_of(1, &affinities[3], &affinities), 1);
 /// ```
 #[must_use]
-pub fn share_of<P: PartialEq>(cores: usize, place: &P, places: &[P]) -> usize {
-    let sharers = places.iter().filter(|other| *other == place).count();
+pub fn share_of<A: PartialEq>(cores: usize, affinity: &A, affinities: &[A]) -> usize {
+    let sharers = affinities.iter().filter(|other| *other == affinity).count();
     (cores / sharers.max(1)).max(1)
 }
 
 /// The machine and those of its cores that this process may run on; nothing where that is not known.
-fn place() -> Vec<u8> {
+fn affinity() -> Vec<u8> {
     let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
     let status = read("/proc/self/status");
     let cores = status.lines().find(|line| line.starts_with("Cpus_allowed_list"));

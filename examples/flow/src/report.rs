@@ -38,7 +38,7 @@ pub struct Report {
     /// The flow.
     pub flow: FlowReport,
     /// What could not be written while the run went on, and why: the saved state, the history. Of
-    /// several failures in a row the first.
+    /// several failures in a row the first, and no more than a hundred in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unwritten: Vec<String>,
     /// Why the run ended early, where it did.
@@ -98,25 +98,28 @@ pub struct FlowReport {
     most_through: f64,
 }
 
+/// How many failures to write are kept for the report.
+const UNWRITTEN: usize = 100;
+
 /// Less than this part of what could flow through the boundary is nothing but rounding.
 const NOTHING: f64 = 1e-9;
 
-/// Keeps in mind what could not be written while the run went on.
+/// The files that could not be written while the run went on.
 #[derive(Debug, Default)]
 pub(crate) struct Unwritten {
-    /// What was told.
+    /// The first failures, as they were told.
     pub(crate) told: Vec<String>,
     failing: BTreeSet<&'static str>,
 }
 
 impl Unwritten {
-    /// Takes note of an attempt; what is to be told, where it is the first in a row that failed.
+    /// Notes an attempt to write; returns the text to tell, where it is the first in a row that failed.
     pub(crate) fn note(
         &mut self,
         what: &'static str,
         cycle: u64,
         written: Result<(), impl Display>,
-    ) -> Option<&str> {
+    ) -> Option<String> {
         let Err(error) = written else {
             self.failing.remove(what);
             return None;
@@ -124,8 +127,11 @@ impl Unwritten {
         if !self.failing.insert(what) {
             return None;
         }
-        self.told.push(format!("cycle {cycle}: {what} could not be written: {error}"));
-        self.told.last().map(String::as_str)
+        let text = format!("cycle {cycle}: {what} could not be written: {error}");
+        if self.told.len() < UNWRITTEN {
+            self.told.push(text.clone());
+        }
+        Some(text)
     }
 }
 
