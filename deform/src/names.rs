@@ -49,8 +49,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     near(name, known).next()
 }
 
-/// What an error says at its end of the known name that is nearest to a misspelt one; nothing where
-/// none is [`near`].
+/// The end of an error about a misspelt name: the known name that is nearest to it; empty where none
+/// is [`near`].
 ///
 /// ```
 /// use tombolo_deform::names::hint;

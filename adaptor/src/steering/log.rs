@@ -520,3 +520,26 @@ fn accepted(id: &str, source: &Source, command: &Command, moment: Moment) -> Jou
         fraction: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use tombolo_pipelines::language::{Cancel, Order};
+
+    use super::*;
+    use crate::steering::Events;
+
+    /// A cancel waits for the disk with its order, and for no other command.
+    #[test]
+    fn a_cancel_waits_for_an_order_that_is_not_on_disk() {
+        let log = Log::new(Journal::none(), None, Events::default());
+        let order: Order = serde_json::from_value(serde_json::json!({"undo": 1})).unwrap();
+        let command = Command::Order(order);
+        let cancels =
+            |order: &str| log.cancels_unwritten(&Command::Cancel(Cancel { order: order.into() }));
+        assert!(!cancels("a"));
+        log.name(1, Some("a".into()), &command).unwrap();
+        assert!(cancels("a") && !cancels("b") && !log.cancels_unwritten(&Command::Pause {}));
+        log.admit("a", &command, Moment::default());
+        assert!(!cancels("a"));
+    }
+}

@@ -248,7 +248,7 @@ impl Shaper {
         };
         for index in lower..stack.len() {
             let followed = self.followed(&stack[..=index], target, deform, guard);
-            // What was found, or not found, while it was given up is not what there is.
+            // A result that was interrupted by a cancellation is kept for no later order.
             self.body.require_wanted()?;
             target = followed?;
             if self.mended.len() >= KEPT {

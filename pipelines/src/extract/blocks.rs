@@ -153,7 +153,7 @@ impl Sides {
 
     /// Which corners of a tetrahedron lie ahead, by bits; `None` where the surface does not cut it:
     /// all lie on one side, or one on neither. Without a branch for each corner, which would be
-    /// foretold wrongly as often as not.
+    /// mispredicted as often as not.
     #[inline]
     pub(super) fn of_tetrahedron(&self, corners: [u32; 4]) -> Option<usize> {
         let mask = |side: usize| {

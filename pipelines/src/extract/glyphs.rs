@@ -100,8 +100,8 @@ fn bounds(source: &Source, communicator: &dyn Communicator) -> Bounds {
 /// A point and the vertices that its values come from.
 type Sampled = (Vector, Found);
 
-/// A vertex of own cells.
-struct Place {
+/// A vertex of own cells that may have a glyph.
+struct Candidate {
     /// Its number in the whole mesh.
     number: u32,
     /// Its number on this rank.
@@ -111,7 +111,7 @@ struct Place {
     key: u64,
 }
 
-impl Place {
+impl Candidate {
     fn sampled(&self, source: &Source) -> Sampled {
         let found = Found { cell: self.cell, row: vec![(self.vertex, 1.0)] };
         (source.positions.points[self.vertex as usize], found)
@@ -120,7 +120,7 @@ impl Place {
 
 /// The vertices of own cells whose numbers in the whole mesh are wanted, by these numbers. Those
 /// that several ranks have, each of them brings. Collective.
-fn at_vertices(source: &Source, input: &Input, is_wanted: impl Fn(u32) -> bool) -> Vec<Place> {
+fn at_vertices(source: &Source, input: &Input, is_wanted: impl Fn(u32) -> bool) -> Vec<Candidate> {
     let key = keys(source, input);
     let numbers = source.whole_mesh().map(|whole| whole.shared.numbers());
     let mut lowest = vec![(u64::MAX, u32::MAX); source.positions.points.len()];
@@ -135,9 +135,9 @@ fn at_vertices(source: &Source, input: &Input, is_wanted: impl Fn(u32) -> bool) 
     }
     let place = |(vertex, (key, cell)): (u32, (u64, u32))| {
         let number = numbers.map_or(vertex, |numbers| numbers[vertex as usize]);
-        (cell < u32::MAX && is_wanted(number)).then_some(Place { number, vertex, cell, key })
+        (cell < u32::MAX && is_wanted(number)).then_some(Candidate { number, vertex, cell, key })
     };
-    let mut places: Vec<Place> = (0..).zip(lowest).filter_map(place).collect();
+    let mut places: Vec<Candidate> = (0..).zip(lowest).filter_map(place).collect();
     places.sort_by_key(|place| place.number);
     places
 }
@@ -147,7 +147,7 @@ fn at_vertices(source: &Source, input: &Input, is_wanted: impl Fn(u32) -> bool) 
 fn every(source: &Source, input: &Input, every: usize) -> Result<Vec<Sampled>, ExtractError> {
     let communicator = input.communicator;
     let mut places = at_vertices(source, input, |number| (number as usize).is_multiple_of(every));
-    let is_owned = |place: &&Place| source.counts(Association::Vertex, place.vertex as usize);
+    let is_owned = |place: &&Candidate| source.counts(Association::Vertex, place.vertex as usize);
     check_count(communicator, places.iter().filter(is_owned).count())?;
     if let Some(whole) = source.whole_mesh().filter(|_| communicator.size() > 1) {
         let mut message = Writer::default();
@@ -166,7 +166,7 @@ fn every(source: &Source, input: &Input, every: usize) -> Result<Vec<Sampled>, E
             }
         }
         let rank = communicator.rank();
-        let is_lowest = |place: &Place| {
+        let is_lowest = |place: &Candidate| {
             lowest.get(&place.number).is_none_or(|lowest| *lowest == (place.key, rank))
         };
         places.retain(is_lowest);
@@ -197,7 +197,7 @@ fn spread(source: &Source, input: &Input, bounds: &Bounds, count: usize) -> Vec<
     }
     let counts = boxes(most);
     // In the order of preference: the square of the distance, the number, the key.
-    let mut own: Vec<Option<([u64; 3], Place)>> = Vec::new();
+    let mut own: Vec<Option<([u64; 3], Candidate)>> = Vec::new();
     own.resize_with(counts.iter().product(), || None);
     for place in at_vertices(source, input, |_| true) {
         let mut index = 0;
@@ -218,7 +218,8 @@ fn spread(source: &Source, input: &Input, bounds: &Bounds, count: usize) -> Vec<
         }
     }
     for part in 0..3 {
-        let of = |own: &Option<([u64; 3], Place)>| own.as_ref().map_or(u64::MAX, |it| it.0[part]);
+        let of =
+            |own: &Option<([u64; 3], Candidate)>| own.as_ref().map_or(u64::MAX, |it| it.0[part]);
         let mut least: Vec<u64> = own.iter().map(of).collect();
         communicator.reduce_integers(Reduction::Minimum, &mut least);
         for (own, least) in own.iter_mut().zip(least) {

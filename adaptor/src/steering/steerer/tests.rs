@@ -6,43 +6,51 @@ use tombolo_pipelines::language::Command;
 use super::*;
 use crate::{
     journal::Journal,
-    steering::{Events, OrderReport, Source},
+    steering::{Events, OrderReport, Received, Source},
 };
 
-/// What is cancelled while its plan is made ends nothing that comes after it.
+/// An order that is cancelled while it is planned does not end the planning of the next one, which
+/// the solver's thread begins before the planning thread has come back.
 #[test]
 fn an_order_is_planned_in_the_moment_in_which_another_is_cancelled() {
     let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
     let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
     let shaper = Shaper::new(&mesh, surface).unwrap();
     let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
+    let queue = Arc::<Queue>::default();
     let mut steerer =
-        Steerer::new(shaper, Defaults::default(), Arc::clone(&log), Arc::default(), false).unwrap();
-    steerer.make_ready();
-    let order = |by: f64, steps: u32| -> Order {
-        serde_json::from_value(serde_json::json!({
+        Steerer::new(shaper, Defaults::default(), Arc::clone(&log), Arc::clone(&queue), false)
+            .unwrap();
+    let moment = Moment::default();
+    let give = |steerer: &mut Steerer, id: &str, by: f64, steps: u32, background: bool| {
+        let order: Order = serde_json::from_value(serde_json::json!({
             "edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, by]}}],
             "schedule": {"steps": steps}
         }))
-        .unwrap()
+        .unwrap();
+        let command = Command::Order(order.clone());
+        log.accept(Some(id.into()), &Source::Program, &command, moment).unwrap();
+        steerer.take(id.into(), order, background, None, None);
+        steerer.advance(moment, None);
     };
-    let moment = Moment::default();
-    for round in 0..30 {
-        let by = -0.2 - 0.001 * f64::from(round);
-        for (name, order, background) in
-            [("long", order(by, 9000), true), ("now", order(-0.01, 1), false)]
-        {
-            let id = format!("{name} {round}");
-            let command = Command::Order(order.clone());
-            log.accept(Some(id.clone()), &Source::Program, &command, moment).unwrap();
-            steerer.take(id.clone(), order, background, None, None);
-            steerer.advance(moment, None);
-            if background {
-                std::thread::sleep(Duration::from_millis(20));
-                assert_eq!(steerer.withdraw(&id), Some(Ok(0)), "{id}");
-            }
-        }
-    }
+    give(&mut steerer, "long", -0.2, 10_000, true);
+    // The planning thread tells the queue of a plan before it takes up anything else.
+    let (begins, begun) = channel();
+    let (ends, ended) = channel::<()>();
+    let holding = std::thread::spawn(move || {
+        let (source, command) = (Source::Program, Command::Resume {});
+        let received = Received { source, id: "held".into(), command, reservation: None };
+        queue.push_and_tell(received, || {
+            begins.send(()).unwrap();
+            let _ = ended.recv_timeout(Duration::from_secs(60));
+        });
+    });
+    begun.recv().unwrap();
+    std::thread::sleep(Duration::from_millis(50));
+    assert_eq!(steerer.withdraw("long"), Some(Ok(0)));
+    give(&mut steerer, "now", -0.01, 1, false);
+    drop(ends);
+    holding.join().unwrap();
     let refused = |report: &OrderReport| report.status == OrderStatus::Rejected;
     assert_eq!(log.reports().into_iter().find(refused), None);
 }

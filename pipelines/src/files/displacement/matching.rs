@@ -19,22 +19,22 @@ pub const TOLERANCE: f64 = 1e-6;
 pub(super) struct Matcher<'a> {
     surface: &'a Surface,
     tolerance: f64,
-    /// Made when they are first needed.
-    places: Option<Places>,
+    /// Made when it is first needed.
+    lookup: Option<Lookup>,
     taken: Vec<bool>,
     found: SurfaceDisplacement,
 }
 
-/// Where the surface vertices are.
-struct Places {
-    /// The first vertex at each place, by the bits of its coordinates.
+/// The surface vertices by their coordinates.
+struct Lookup {
+    /// The first vertex at each point, by the bits of its coordinates.
     exact: HashMap<[u64; 3], u32>,
     /// All vertices, at coordinates that are scaled so that no square is infinite.
     tree: BoxTree,
     scale: f64,
 }
 
-impl Places {
+impl Lookup {
     fn new(surface: &Surface, largest: f64) -> Self {
         // A power of two, which rounds nothing.
         let scale = (-largest.log2().floor().clamp(-1000.0, 1000.0)).exp2();
@@ -56,21 +56,21 @@ impl<'a> Matcher<'a> {
         let tolerance =
             (TOLERANCE * bounds.diagonal()).max(rounded).clamp(f64::MIN_POSITIVE, f64::MAX / 4.0);
         let taken = vec![false; surface.points().len()];
-        Self { surface, tolerance, places: None, taken, found: SurfaceDisplacement::default() }
+        Self { surface, tolerance, lookup: None, taken, found: SurfaceDisplacement::default() }
     }
 
-    fn places(&mut self) -> &Places {
+    fn lookup(&mut self) -> &Lookup {
         let surface = self.surface;
-        self.places.get_or_insert_with(|| {
+        self.lookup.get_or_insert_with(|| {
             let bounds = Bounds::around(surface.points().iter().copied());
-            Places::new(surface, largest(&bounds))
+            Lookup::new(surface, largest(&bounds))
         })
     }
 
     /// The surface vertex at a point, or nearest to it within the tolerance.
     fn nearest(&mut self, point: Vector) -> Option<u32> {
         let tolerance = self.tolerance;
-        let Places { exact, tree, scale } = self.places();
+        let Lookup { exact, tree, scale } = self.lookup();
         let nearest =
             || tree.nearest(point.map(|part| scale * part), scale * tolerance).map(|it| it.0);
         exact.get(&bits(point)).copied().or_else(nearest)
@@ -79,7 +79,7 @@ impl<'a> Matcher<'a> {
     /// Whether another surface vertex lies within the tolerance of this one.
     pub fn has_neighbour(&mut self, point: Vector) -> bool {
         let tolerance = self.tolerance;
-        let Places { tree, scale, .. } = self.places();
+        let Lookup { tree, scale, .. } = self.lookup();
         let mut count = 0;
         tree.around(point.map(|part| scale * part), scale * tolerance, |_| count += 1);
         count > 1
@@ -151,7 +151,7 @@ fn largest(bounds: &Bounds) -> f64 {
     bounds.corners().as_flattened().iter().fold(0.0, |largest, value| value.abs().max(largest))
 }
 
-/// A place by its bits; 0 has no sign.
+/// The bits of a point's coordinates; 0 has no sign.
 fn bits(point: Vector) -> [u64; 3] {
     point.map(|part| (part + 0.0).to_bits())
 }
