@@ -2,6 +2,7 @@
 //! can read anywhere else.
 
 use std::{
+    ffi::OsString,
     io::{self, Write},
     net::SocketAddr,
     path::{Path, PathBuf},
@@ -22,16 +23,30 @@ pub(super) struct LinkFile(PathBuf);
 
 impl LinkFile {
     pub(super) fn write(path: PathBuf, text: &str) -> io::Result<Self> {
-        // A new file, so that neither a link that lies there nor another's permissions count.
-        match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-        let mut file = private().create_new(true).open(&path)?;
-        let links = Self(path);
-        file.write_all(text.as_bytes())?;
-        Ok(links)
+        write_whole(&path, text)?;
+        Ok(Self(path))
     }
+
+    /// Writes the file again; whoever reads it meanwhile finds the old text or the new one.
+    fn rewrite(&self, text: &str) -> io::Result<()> {
+        write_whole(&self.0, text)
+    }
+}
+
+/// Writes a new file beside it and renames that, so that neither a link that lies there nor another's
+/// permissions count, and nobody finds half a file or none.
+fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    let mut name = OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(".part");
+    let beside = LinkFile(path.with_file_name(name));
+    // What a run that was killed has left.
+    match std::fs::remove_file(&beside.0) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    private().create_new(true).open(&beside.0)?.write_all(text.as_bytes())?;
+    std::fs::rename(&beside.0, path)
 }
 
 impl Drop for LinkFile {
@@ -155,21 +170,23 @@ impl Links {
     }
 
     fn write(&self, path: PathBuf) -> io::Result<()> {
-        let lines = self.lines();
         let mut file = lock(&self.file);
-        // First the old one goes, which may be the same file.
-        *file = None;
-        *file = Some(LinkFile::write(path, &lines)?);
+        // Under the lock: a name that the relay gives meanwhile is written behind these.
+        let lines = self.lines();
+        match &*file {
+            Some(there) if there.0 == path => there.rewrite(&lines)?,
+            _ => *file = Some(LinkFile::write(path, &lines)?),
+        }
         Ok(())
     }
 
     /// Writes the file again, after the run has got another name at its relay.
     pub(super) fn renew(&self) {
-        let path = lock(&self.file).as_ref().map(|file| file.0.clone());
-        if let Some(path) = path
-            && let Err(error) = self.write(path.clone())
+        let file = lock(&self.file);
+        if let Some(file) = &*file
+            && let Err(error) = file.rewrite(&self.lines())
         {
-            let path = path.display();
+            let path = file.0.display();
             tracing::warn!(%path, "the links were not written to {path}: {error}");
         }
     }
@@ -202,4 +219,40 @@ pub(super) fn authority(address: SocketAddr) -> String {
 pub(super) fn with_colons(fingerprint: &str) -> String {
     let pairs = (0..fingerprint.len() / 2).filter_map(|at| fingerprint.get(2 * at..2 * at + 2));
     pairs.collect::<Vec<_>>().join(":")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_file_of_links_is_whole_whenever_it_is_read() {
+        let directory = tempfile::tempdir().expect("a folder");
+        let path = directory.path().join("tombolo-run.link");
+        let text = |address: &str| format!("drive: {address}\nwatch: {address}\n");
+        let file = LinkFile::write(path.clone(), &text("http://before/")).expect("written");
+        let ended = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| {
+                while !ended.load(Ordering::Relaxed) {
+                    let read = std::fs::read_to_string(&path).expect("it is there");
+                    assert!(
+                        [text("http://before/"), text("http://behind/")].contains(&read),
+                        "{read}"
+                    );
+                }
+            });
+            for _ in 0..500 {
+                file.rewrite(&text("http://behind/")).expect("written");
+                file.rewrite(&text("http://before/")).expect("written");
+            }
+            ended.store(true, Ordering::Relaxed);
+            reader.join().expect("every reading was whole");
+        });
+        drop(file);
+        let left = std::fs::read_dir(directory.path()).expect("the folder").count();
+        assert_eq!(left, 0);
+    }
 }
