@@ -68,16 +68,20 @@ fn kind(given: &Given<'_>) -> String {
     format!("a {}", given.get_type())
 }
 
+/// What was given, as Python writes it, or the beginning of that.
+pub(crate) fn found(given: &Given<'_>) -> String {
+    let text = given.repr().map_or_else(|_| kind(given), |text| text.to_string());
+    text.chars().take(100).collect()
+}
+
 fn python(what: &str) -> impl Fn(PyErr) -> RunError + '_ {
     move |error| argument(what, error.to_string(), "what can be read")
 }
 
 fn name(given: &Given<'_>, what: &str) -> Read<String> {
     let name = given.cast::<PyString>().ok().map(|name| name.to_string_lossy().into_owned());
-    name.filter(|name| !name.is_empty() && !name.chars().any(char::is_control)).ok_or_else(|| {
-        let found = given.repr().map_or_else(|_| kind(given), |text| text.to_string());
-        argument(what, found, "a name of one letter or more, on one line")
-    })
+    name.filter(|name| !name.is_empty() && !name.chars().any(char::is_control))
+        .ok_or_else(|| argument(what, found(given), "a name of one letter or more, on one line"))
 }
 
 /// The entries of a mapping.

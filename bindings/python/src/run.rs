@@ -10,8 +10,10 @@ use tombolo::foreign::{self, RunError, Shown, ranks};
 use tombolo::pipelines::language;
 use tombolo::{Condition, ExecuteError, Parameter, Settings, Stopper};
 
-use crate::error::{CallError, ConfigurationError, FailedError, guarded, of_run};
-use crate::lender::{Channels, Lender};
+use crate::error::{
+    CallError, ConfigurationError, FailedError, StepError, argument, guarded, of_run,
+};
+use crate::lender::{Channels, Lender, found};
 use crate::motion::Motion;
 
 /// The motion that is asked for, whether to stop, and the parameters where they have changed.
@@ -100,6 +102,23 @@ impl Stage {
             )),
         }
     }
+}
+
+/// The step of a call.
+fn step(
+    cycle: &Bound<'_, PyAny>,
+    time: &Bound<'_, PyAny>,
+    time_step: &Bound<'_, PyAny>,
+) -> Result<tombolo::Step, RunError> {
+    let number = |name, given: &Bound<'_, PyAny>| {
+        given.extract().map_err(|_| argument(name, found(given), "a number"))
+    };
+    let whole = |_| argument("cycle", found(cycle), "a whole number from 0 on");
+    Ok(tombolo::Step {
+        cycle: cycle.extract().map_err(whole)?,
+        time: number("time", time)?,
+        time_step: number("time_step", time_step)?,
+    })
 }
 
 /// A configuration or orders as they were given: a text with its name, or the path of a file.
@@ -198,9 +217,9 @@ impl Run {
     fn execute<'py>(
         &self,
         py: Python<'py>,
-        cycle: u64,
-        time: f64,
-        time_step: f64,
+        cycle: &Bound<'py, PyAny>,
+        time: &Bound<'py, PyAny>,
+        time_step: &Bound<'py, PyAny>,
         channels: &Bound<'py, PyAny>,
     ) -> PyResult<Option<Asked<'py>>> {
         let mut state = self.hold()?;
@@ -212,11 +231,19 @@ impl Run {
         // A motion along the third axis would be lost.
         let flat = dimensions.iter().filter(|(_, dimension)| *dimension == 2);
         flat.for_each(|(channel, _)| run.keep_in_plane(channel));
-        let step = tombolo::Step { cycle, time, time_step };
-        let looked_at = run.looks_at(&step);
-        let given = given.map(|channels| Shown { step, looked_at, channels: channels.0 });
+        // Refused with what else is wrong on one rank: the others would wait for it.
+        let step = step(cycle, time, time_step);
+        let cycle = step.as_ref().map_or(0, |step| step.cycle);
+        let is_step = step.is_ok();
+        let given = step.and_then(|step| {
+            let looked_at = run.looks_at(&step);
+            given.map(|channels| Shown { step, looked_at, channels: channels.0 })
+        });
         let call = Call { run, given };
-        let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run));
+        let exception = |error: RunError| {
+            if is_step { of_run(error) } else { StepError::new_err(error.to_string()) }
+        };
+        let shown = guarded(|| py.detach(|| call.execute()).map_err(exception));
         drop(lender);
         // Before the step's own error, lest it be raised by a later call.
         if let Some(error) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
@@ -249,9 +276,16 @@ impl Run {
     }
 
     /// Whether anything is due at a step that looks at the mesh and its fields.
-    fn looks_at(&self, cycle: u64, time: f64, time_step: f64) -> PyResult<bool> {
+    fn looks_at(
+        &self,
+        cycle: &Bound<'_, PyAny>,
+        time: &Bound<'_, PyAny>,
+        time_step: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        let step =
+            step(cycle, time, time_step).map_err(|error| StepError::new_err(error.to_string()))?;
         let mut state = self.hold()?;
-        Ok(state.stage.run()?.looks_at(&tombolo::Step { cycle, time, time_step }))
+        Ok(state.stage.run()?.looks_at(&step))
     }
 
     #[getter]

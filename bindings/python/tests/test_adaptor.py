@@ -212,8 +212,13 @@ def test_a_time_that_is_none_is_refused(time):
             adaptor.execute(0, time, 0.1, mesh())
         with pytest.raises(tombolo.StepError):
             adaptor.execute(0, 0.0, -0.1, mesh())
-        with pytest.raises((OverflowError, TypeError)):
-            adaptor.execute(-1, 0.0, 0.1, mesh())
+        for cycle in (-1, 1.5, "first", 2**64):
+            with pytest.raises(tombolo.StepError, match=f"cycle: found '?{cycle}'?; expected a whole number from 0 on"):
+                adaptor.execute(cycle, 0.0, 0.1, mesh())
+            with pytest.raises(tombolo.StepError, match="cycle"):
+                adaptor.looks_at(cycle, 0.0, 0.1)
+        with pytest.raises(tombolo.StepError, match="time_step: found 'long'; expected a number"):
+            adaptor.execute(0, 0.0, "long", mesh())
 
 
 def test_a_configuration_is_a_file_a_dict_or_an_error_with_its_place(tmp_path):

@@ -289,7 +289,7 @@ class Adaptor:
         MeshError
             Arrays that do not fit together. Nothing was done: the solver may mend it and call again.
         StepError
-            A time that is not finite, or no channel.
+            A negative cycle, a time that is not finite, or no channel.
         CallError
             The adaptor is closed, or in a call of another thread.
         """

@@ -36,7 +36,7 @@ class MeshError(TomboloError, ValueError):
 
 
 class StepError(TomboloError, ValueError):
-    """A step that cannot be: a time that is not finite, no channel, the steered channel gone."""
+    """A step that cannot be: a negative cycle, a time that is not finite, no channel, the steered channel gone."""
 
 
 class CallError(TomboloError, RuntimeError):
