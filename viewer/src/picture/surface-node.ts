@@ -97,6 +97,9 @@ export function drawInstead(mapper: object, cells: CoarseCells | null): void {
   else coarse.delete(mapper);
 }
 
+/** The cells that a mapper's surface is drawn with now; null where it is drawn whole. */
+export const insteadOf = (mapper: object): CoarseCells | null => coarse.get(mapper) ?? null;
+
 /** The three sides of triangles, as lines. */
 export function sidesOf(triangles: Uint32Array): Uint32Array {
   const result = new Uint32Array(2 * triangles.length);
@@ -141,7 +144,7 @@ function extendNode(publicAPI: Node, model: NodeModel, initialValues: object = {
   let made: { of: Uint32Array; over: ArrayLike<number>; sides?: Uint32Array; corners?: Uint32Array } | null = null;
   /** Draws what was wanted in place of the whole. */
   const drawWanted = (): void => {
-    const wanted = coarse.get(model.renderable);
+    const wanted = insteadOf(model.renderable);
     if (!wanted) return;
     const { triangles, lines } = wanted;
     const buffer = (primitive: number): Buffer => model.primitives[primitive]!.getCABO();
