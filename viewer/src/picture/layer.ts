@@ -259,6 +259,11 @@ export class Layer {
     return this.colouring.field;
   }
 
+  /** Whether some of the values that colour it are no numbers, and grey. */
+  get hasGaps(): boolean {
+    return this.colouring.hasGaps;
+  }
+
   highlight(kind: Highlight, names: readonly string[], features: readonly string[]): void {
     const topology = this.topology;
     const key = names.join("\u0000");

@@ -115,14 +115,16 @@ export function sidesOf(triangles: Uint32Array): Uint32Array {
  * and none is shared. The colours of a corner are those of the first triangle that has it. `cells` are vtk.js's own, with sizes between.
  */
 export function cornersOf(triangles: Uint32Array, cells: ArrayLike<number>): Uint32Array {
-  const corners = new Map<number, number>();
-  for (const point of triangles) corners.set(point, 0);
-  for (let at = 0, corner = 0; at < cells.length; at += 4) {
+  const highest = triangles.reduce((most, point) => Math.max(most, point), 0);
+  // The number after each point's first corner; 0 for none.
+  const after = new Uint32Array(highest + 1);
+  for (let at = 0, corner = 1; at < cells.length; at += 4) {
     for (let k = 1; k <= 3; k++, corner++) {
-      if (corners.get(cells[at + k]!) === 0) corners.set(cells[at + k]!, corner + 1);
+      const point = cells[at + k]!;
+      if (after[point] === 0) after[point] = corner;
     }
   }
-  return triangles.map((point) => Math.max(0, corners.get(point)! - 1));
+  return triangles.map((point) => Math.max(0, after[point]! - 1));
 }
 
 /** What vtk.js draws one after the other. */

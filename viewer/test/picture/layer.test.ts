@@ -163,8 +163,12 @@ describe("colours", () => {
     expect((parts.surface.mapper.getLookupTable() as unknown as { getNanColor(): number[] }).getNanColor()).toEqual([0.5, 0.5, 0.5, 1]);
     const isGrey = (): boolean[] => [...parts.surface.data.getPointData().getScalars().getData()].map(Number.isNaN);
     expect(isGrey()).toEqual([false, false, false, true]);
+    // The bar says so, as long as there are such values.
+    expect(colour([layer], new Ranges(), false).map(({ hasGaps }) => hasGaps)).toEqual([true]);
+    show(frame(2, [0, 1, 2, 3]));
+    expect(colour([layer], new Ranges(), false).map(({ hasGaps }) => hasGaps)).toEqual([false]);
     // Where there is none at all, nothing of the frame before is left.
-    expect(layer.setData(frame(2, [NaN, NaN, NaN, NaN]))).toBeNull();
+    expect(layer.setData(frame(3, [NaN, NaN, NaN, NaN]))).toBeNull();
     colour([layer], new Ranges(), false);
     expect(isGrey()).toEqual([true, true, true, true]);
   });
