@@ -7,6 +7,8 @@
 export const SLOW = 30;
 /** How long after the last movement the picture is drawn whole again, in milliseconds. */
 export const STILL = 150;
+/** Movements that follow each other after no longer than this are one, in milliseconds: a camera that is followed comes five times a second. */
+const LONGEST_GAP = 300;
 /** How many whole pictures tell what one costs. */
 const MEASURED = 5;
 
@@ -14,6 +16,7 @@ export class Detail {
   private timer: number | null = null;
   private readonly costs: number[] = [];
   private isMeasuring = false;
+  private moved = -Infinity;
   /** Whether large views are drawn with fewer triangles now. */
   isCoarse = false;
 
@@ -40,12 +43,14 @@ export class Detail {
   move(): void {
     // The quickest of them: others have made shaders, or stood behind other work.
     this.isCoarse ||= this.costs.length > 0 && Math.min(...this.costs) > SLOW;
+    const now = performance.now(), gap = now - this.moved;
+    this.moved = now;
     if (!this.isCoarse) return;
     if (this.timer !== null) clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
       this.rest();
       this.changed();
-    }, STILL);
+    }, gap > STILL && gap < LONGEST_GAP ? 1.5 * gap : STILL);
   }
 
   /** The picture is wanted whole. */

@@ -36,6 +36,20 @@ test("a quick picture is always whole, also where its first one was slow; and so
   expect(detail.isCoarse).toBe(true);
 });
 
+test("a camera that is followed, which moves five times a second, is not drawn whole in between", () => {
+  detail.took(SLOW + 1);
+  detail.move();
+  vi.advanceTimersByTime(200);
+  for (let move = 0; move < 5; move++) {
+    detail.move();
+    vi.advanceTimersByTime(199);
+    expect(detail.isCoarse).toBe(true);
+    vi.advanceTimersByTime(1);
+  }
+  vi.advanceTimersByTime(100);
+  expect(detail.isCoarse).toBe(false);
+});
+
 /** A context that takes some time to draw, or is lost. */
 function context(milliseconds: number, isLost = false): WebGL2RenderingContext {
   const end = performance.now() + milliseconds;
