@@ -76,7 +76,9 @@ try {
 
   // Where nothing lies under the pointer, so that it turns the picture.
   const scene = await page.locator("#scene").boundingBox();
-  const [left, top] = [scene.x + 0.1 * scene.width, scene.y + 0.1 * scene.height];
+  const [left, top] = [scene.x + 0.1 * scene.width, scene.y + 0.4 * scene.height];
+  const camera = () => page.evaluate(() => JSON.stringify(window.tombolo.camera));
+  const stood = await camera();
   await page.mouse.move(left, top);
   await page.mouse.down();
   let isWatched = true;
@@ -84,6 +86,7 @@ try {
   for (let step = 0; isWatched; step++) await page.mouse.move(left + 3 * (step % 100), top + (step % 50));
   const byMouse = await watched;
   await page.mouse.up();
+  if (await camera() === stood) throw new Error("the mouse did not turn the picture");
 
   let firstPreview = null, dragging = null;
   await page.click('[data-camera="0"]');

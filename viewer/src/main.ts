@@ -273,6 +273,7 @@ const ground = (): string => getComputedStyle(document.body).getPropertyValue("-
 const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink(), ground()), {
   name: () => `tombolo-${store.state.frames.cycle ?? 0}`,
   told: (isRunning) => {
+    scene.isFilmed = isRunning;
     part("movie").setAttribute("aria-pressed", String(isRunning));
     write(part("movie"), isRunning ? "End film" : "Film");
     // So that it begins with what is seen, also where nothing changes.

@@ -3,7 +3,7 @@ import { element, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
 import { readNumber, whyNoNumber, within, words } from "../number";
-import { colourMap, componentNames, gradient } from "./colour";
+import { GREY, NO_NUMBER_TEXT, colourMap, componentNames, gradient } from "./colour";
 import { valueAt } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
@@ -15,7 +15,7 @@ const HINT = "Type a number to fix the range";
 export interface BarText { title: string; unit: string | null }
 
 export class ScalarBars {
-  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; cells: ExactCell[]; range: Range; typed: (range: Range) => void; name: (text: BarText) => void }>();
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; gaps: HTMLElement; cells: ExactCell[]; range: Range; typed: (range: Range) => void; name: (text: BarText) => void }>();
 
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
@@ -37,6 +37,7 @@ export class ScalarBars {
     shown.range = bar.range;
     shown.typed = (range) => this.fix(bar.views, range);
     shown.name(this.describe(bar));
+    shown.gaps.hidden = !bar.hasGaps;
     const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
     ticks.forEach((tick, i) => write(tick, at(i + 1)));
     ends.forEach((input, i) => {
@@ -63,9 +64,12 @@ export class ScalarBars {
     const ticks = Array.from({ length: TICKS - 2 }, () => element("li"));
     const colours = element("div", { class: "colours" });
     colours.style.background = gradient(colourMap(bar.look.map), "to top");
+    const gap = element("span", { class: "gap" });
+    gap.style.background = GREY;
+    const gaps = element("div", { class: "gaps" }, gap, NO_NUMBER_TEXT);
     const [title, unit] = [element("span"), element("small")];
     const root = element("div", { class: "scalar-bar", role: "group" }, element("div", { class: "title" }, title, unit),
-      element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))));
+      element("div", { class: "body" }, colours, element("ol", {}, element("li", {}, ends[1]), ...ticks, element("li", {}, ends[0]))), gaps);
     this.root.append(root);
     // What the run says of a field may come later than its values.
     const name = (text: BarText): void => {
@@ -75,7 +79,7 @@ export class ScalarBars {
       write(unit, text.unit ?? "");
       unit.hidden = !text.unit;
     };
-    const shown = { root, ticks, ends, cells, range: bar.range, name, typed: (_: Range): void => undefined };
+    const shown = { root, ticks, ends, gaps, cells, range: bar.range, name, typed: (_: Range): void => undefined };
     this.shown.set(bar.key, shown);
     return shown;
   }

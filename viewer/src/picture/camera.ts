@@ -12,6 +12,8 @@ export interface Stand { position: Vector; focalPoint: Vector; viewUp: Vector; p
 export class Camera {
   /** Where it stood when `reset` had put the whole into the picture; null where it never did. */
   private whole: string | null = null;
+  /** Where it stood when that was last asked. */
+  private last = "";
   /** Whether it was put anywhere yet. */
   isPlaced = false;
 
@@ -36,6 +38,14 @@ export class Camera {
       position: [...camera.getPosition()] as Vector, focalPoint: [...camera.getFocalPoint()] as Vector, viewUp: [...camera.getViewUp()] as Vector,
       parallel: camera.getParallelProjection(), parallelScale: camera.getParallelScale(), viewAngle: camera.getViewAngle(),
     };
+  }
+
+  /** Whether it stands elsewhere than when this was last asked; that it stands anywhere at all is no movement. */
+  hasMoved(): boolean {
+    const now = JSON.stringify(this.stand);
+    const isOther = this.isPlaced && this.last !== "" && now !== this.last;
+    this.last = this.isPlaced ? now : "";
+    return isOther;
   }
 
   set stand(stand: Stand) {

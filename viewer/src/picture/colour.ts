@@ -48,6 +48,18 @@ export function mapped(values: Float32Array, [low, high]: readonly [number, numb
   return into;
 }
 
+/** The grey, between 0 and 1, of what is no number, as in the pictures that a run writes. */
+export const NO_NUMBER = 0.5;
+/** The same for the page, and what stands beside it. */
+export const GREY = `rgb(${Array(3).fill(Math.round(255 * NO_NUMBER)).join(" ")})`;
+export const NO_NUMBER_TEXT = "no number";
+
+/** Whether some value is no number. */
+export function hasGaps(values: Float32Array): boolean {
+  for (const value of values) if (Number.isNaN(value)) return true;
+  return false;
+}
+
 /** Smallest and largest finite value; null when there is none. */
 export function extremes(values: Float32Array): [number, number] | null {
   let low = Infinity;

@@ -5,11 +5,9 @@ import vtkDataArray from "@kitware/vtk.js/Common/Core/DataArray";
 import type vtkPolyData from "@kitware/vtk.js/Common/DataModel/PolyData";
 import type { DataArray } from "../connection/protocol";
 import type { Look } from "../store/looks";
-import { colourMap, extremes, mapped, scalars } from "./colour";
+import { NO_NUMBER, colourMap, extremes, hasGaps, mapped, scalars } from "./colour";
 import type { Range } from "./ranges";
 
-/** Where there is no number, as in the pictures that a run writes. */
-const NO_NUMBER = 0.5;
 /** vtk.js lets no coordinate be farther from its texture. */
 const FARTHEST = 1000;
 
@@ -17,7 +15,7 @@ const FARTHEST = 1000;
 interface Mapped { getColorCoordinates(): vtkDataArray | null; getNumberOfColorsInRange(): number }
 
 /** The values that colour: of which field they are, and what vtk.js counts first among its cells. */
-interface Taken { field: DataArray; component: number; values: Float32Array; range: Range | null }
+interface Taken { field: DataArray; component: number; values: Float32Array; range: Range | null; hasGaps: boolean }
 
 export class Colouring {
   /** The colours from 0 to 1. The values are brought between these two: vtk.js makes a map anew whenever its ends change, and its shaders with it. */
@@ -40,6 +38,11 @@ export class Colouring {
     return this.taken?.field ?? null;
   }
 
+  /** Whether some value of the field is no number, and grey. */
+  get hasGaps(): boolean {
+    return this.taken?.hasGaps ?? false;
+  }
+
   /** Takes a field, or none, of a view that has so many triangles; returns the range of its values, null where there are none. */
   take(field: DataArray | null, component: number, triangles: number): Range | null {
     if (!field) this.taken = null;
@@ -47,7 +50,7 @@ export class Colouring {
       const values = scalars(field, component);
       // vtk.js numbers the lines of a view before its triangles.
       const isReordered = field.association === "element" && triangles > 0 && triangles < values.length;
-      this.taken = { field, component, values: isReordered ? linesFirst(values, triangles) : values, range: extremes(values) };
+      this.taken = { field, component, values: isReordered ? linesFirst(values, triangles) : values, range: extremes(values), hasGaps: hasGaps(values) };
     }
     this.mapper.setScalarVisibility(this.taken !== null);
     return this.taken?.range ?? null;

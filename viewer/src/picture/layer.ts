@@ -7,7 +7,13 @@ import vtkCellArray from "@kitware/vtk.js/Common/Core/CellArray";
 import type vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type { Colour } from "./colour";
 import { Colouring } from "./colouring";
+import { clusterer } from "./clusterer";
+import type { Clusterer } from "./clusterer";
+import { coarsened } from "./clustering";
+import type { Clusters } from "./clustering";
 import { bounds, featureEdges } from "./picking";
+import { drawInstead } from "./surface-node";
+import type { CoarseCells } from "./surface-node";
 import type { Look } from "../store/looks";
 import type { Range } from "./ranges";
 import type { DataArray, DataFrame, TopologyFrame, Vector } from "../connection/protocol";
@@ -44,6 +50,10 @@ export class Piece {
   readonly data = vtkPolyData.newInstance();
   readonly mapper = vtkMapper.newInstance();
   readonly actor = vtkActor.newInstance();
+  /** Fewer cells over the same points; null where there are none. */
+  private coarse: CoarseCells | null = null;
+  private triangles: Uint32Array = new Uint32Array(0);
+  private lines: Uint32Array = new Uint32Array(0);
 
   constructor(points: vtkPoints, renderer: vtkRenderer) {
     this.data.setPoints(points);
@@ -54,6 +64,7 @@ export class Piece {
   }
 
   setTriangles(triangles: Uint32Array): void {
+    this.triangles = triangles;
     this.data.setPolys(vtkCellArray.newInstance({ values: cells(triangles, 3) }));
     this.data.modified();
   }
@@ -64,8 +75,23 @@ export class Piece {
   }
 
   setLines(lines: Uint32Array): void {
+    this.lines = lines;
     this.data.setLines(vtkCellArray.newInstance({ values: cells(lines, 2) }));
     this.data.modified();
+  }
+
+  /** Cells to be drawn in place of the whole where `drawCoarse` says so; null where there are none. */
+  setCoarse(coarse: CoarseCells | null): void {
+    this.coarse = coarse;
+  }
+
+  /** Has its own cells drawn between their representatives instead; null takes that back. */
+  coarsen(representatives: Uint32Array | null): void {
+    this.coarse = representatives && { triangles: coarsened(this.triangles, 3, representatives), lines: coarsened(this.lines, 2, representatives) };
+  }
+
+  drawCoarse(isCoarse: boolean): void {
+    drawInstead(this.mapper, isCoarse ? this.coarse : null);
   }
 }
 
@@ -89,8 +115,11 @@ export class Layer {
   private readonly edges: Piece;
   private readonly highlights: Partial<Record<Highlight, HighlightPieces>> = {};
   private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
+  /** Who stands for whom where the view is drawn with fewer triangles; null where it has none to spare, or they are not known yet. */
+  private representatives: Uint32Array | null = null;
+  private unwant: () => void = () => undefined;
 
-  constructor(readonly name: string, readonly kind: string, look: Look, private readonly renderer: vtkRenderer) {
+  constructor(readonly name: string, readonly kind: string, look: Look, private readonly renderer: vtkRenderer, private readonly clusters: Pick<Clusterer, "want"> = clusterer) {
     this.look = look;
     this.surface = new Piece(this.points, renderer);
     this.colouring = new Colouring(this.surface.data, this.surface.mapper);
@@ -133,6 +162,7 @@ export class Layer {
   }
 
   remove(): void {
+    this.unwant();
     for (const piece of this.pieces()) this.renderer.removeActor(piece.actor);
   }
 
@@ -144,6 +174,8 @@ export class Layer {
     this.topology = topology;
     this.tree = null;
     this.frame = null;
+    this.unwant();
+    this.takeClusters(null);
     this.colouring.take(null, -1, 0);
     for (const key of Object.keys(this.highlighted) as Highlight[]) this.highlighted[key] = "";
   }
@@ -183,7 +215,10 @@ export class Layer {
       this.points.setData(frame.points, 3);
       this.points.modified();
     }
-    if (fresh) this.setCells(topology);
+    if (fresh) {
+      this.setCells(topology);
+      this.unwant = this.clusters.want(topology, frame.points, (clusters) => this.takeClusters(clusters));
+    }
     return null;
   }
 
@@ -192,6 +227,13 @@ export class Layer {
     this.surface.setLines(topology.lines);
     this.edges.setLines(topology.triangleFeatures
       ? featureEdges(topology.triangles, topology.triangleFeatures, topology.points) : new Uint32Array(0));
+  }
+
+  /** Takes who stands for whom; null where nobody does, and the view is drawn whole. What lies on the surface goes with it. */
+  private takeClusters(clusters: Clusters | null): void {
+    this.representatives = clusters?.representatives ?? null;
+    this.surface.setCoarse(clusters && { triangles: clusters.triangles });
+    for (const piece of this.pieces()) if (piece !== this.surface) piece.coarsen(this.representatives);
   }
 
   /** The box around what is drawn. */
@@ -217,6 +259,11 @@ export class Layer {
     return this.colouring.field;
   }
 
+  /** Whether some of the values that colour it are no numbers, and grey. */
+  get hasGaps(): boolean {
+    return this.colouring.hasGaps;
+  }
+
   highlight(kind: Highlight, names: readonly string[], features: readonly string[]): void {
     const topology = this.topology;
     const key = names.join("\u0000");
@@ -231,6 +278,7 @@ export class Layer {
     const { tint, outline } = this.highlightOf(kind);
     tint.setTriangles(triangles);
     outline.setLines(featureEdges(triangles, new Uint32Array(triangles.length / 3), topology.points));
+    for (const piece of [tint, outline]) piece.coarsen(this.representatives);
   }
 
   /** The colours of lines that are not a field's: dark lines on a light ground. */
@@ -239,8 +287,9 @@ export class Layer {
     this.surface.actor.getProperty().setEdgeColor(...edge);
   }
 
-  /** Brings what is shown in line with the look. */
-  show(): void {
+  /** Brings what is shown in line with the look; a large view has fewer triangles where the picture is to be coarse. */
+  show(isCoarse = false): void {
+    for (const piece of this.pieces()) piece.drawCoarse(isCoarse);
     const { visible, opacity, edges } = this.look;
     const drawn = visible && this.frame !== null;
     const property = this.surface.actor.getProperty();

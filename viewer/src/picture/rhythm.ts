@@ -22,10 +22,15 @@ export class Rhythm {
   private begun: number | null = null;
   /** Who waits for the next picture, and whether somebody wants all in it that has come. */
   private listeners: (() => void)[] = [];
-  private isAllWanted = false;
+  private allWanted = false;
 
   /** While an interaction draws pictures by itself, `draw` is not called. */
   constructor(private readonly picture: { isAnimating(): boolean; draw(): void }, private readonly clock: Clock = browserClock) {}
+
+  /** Whether somebody waits for a picture of all that has come. */
+  get isAllWanted(): boolean {
+    return this.allWanted;
+  }
 
   /** Asks for a picture. `drawn` is called with it, while the canvas holds it. */
   request(drawn?: () => void): void {
@@ -40,7 +45,7 @@ export class Rhythm {
 
   /** Asks for a picture of all that has come. */
   requestAll(drawn: () => void): void {
-    this.isAllWanted = true;
+    this.allWanted = true;
     this.request(drawn);
   }
 
@@ -62,7 +67,7 @@ export class Rhythm {
    */
   takesValues(isUrgent = false): boolean {
     const now = this.clock.now();
-    if (now < this.rested && !this.isAllWanted && !isUrgent) {
+    if (now < this.rested && !this.allWanted && !isUrgent) {
       this.requestGently();
       return false;
     }
@@ -72,7 +77,7 @@ export class Rhythm {
 
   /** The picture was drawn. */
   drawn(): void {
-    this.isAllWanted = false;
+    this.allWanted = false;
     const { begun } = this;
     this.begun = null;
     for (const told of this.listeners.splice(0)) told();

@@ -13,6 +13,7 @@ import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
 import type { Box } from "./camera";
+import { Detail } from "./detail";
 import { mouse } from "./mouse";
 import { Pace } from "./pace";
 import { cornersOf, probeNear, readProbe, weights } from "./probe";
@@ -52,6 +53,12 @@ export class Scene {
   private readonly renderer = vtkRenderer.newInstance();
   private readonly canvas: vtkOpenGLRenderWindow;
   private readonly pace: Pace;
+  private readonly detail = new Detail(() => this.request());
+  /** Whether what is drawn now is a film's, which is whole. */
+  isFilmed = false;
+  /** When the picture was begun that is being made up, and whether it is whole. */
+  private begun = 0;
+  private isWhole = true;
   private readonly interactor = vtkRenderWindowInteractor.newInstance();
   readonly camera: Camera;
   private readonly ranges = new Ranges();
@@ -132,7 +139,10 @@ export class Scene {
   /** Shows the shape that an edit would make, with its broken triangles; null takes it away. `drawn` is called once it is seen. */
   setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
     this.ghost.setPoints(points, broken);
-    if (points) this.pace.move();
+    if (points) {
+      this.pace.move();
+      this.detail.move();
+    }
     this.request(drawn);
   }
 
@@ -428,6 +438,10 @@ export class Scene {
 
   /** Brings what is about to be drawn up to what has come. */
   private prepare(): void {
+    this.begun = performance.now();
+    if (this.camera.hasMoved()) this.detail.move();
+    const isCoarse = this.detail.isCoarse && !this.isFilmed && !this.rhythm.isAllWanted;
+    this.isWhole = !isCoarse;
     if (this.pending.size > 0) {
       // A view with another topology is not seen until its values are there.
       const isMissing = [...this.pending.keys()].some((name) => this.layers.get(name)?.frame === null);
@@ -442,7 +456,7 @@ export class Scene {
       layer.highlight("handle", this.selection.chosen("handle", names), names);
       layer.highlight("fixed", this.selection.chosen("fixed", names), names);
       layer.highlight("hover", this.selection.hovered ? [this.selection.hovered] : [], names);
-      layer.show();
+      layer.show(isCoarse);
     }
     this.isEmpty &&= [...this.layers.values()].every((layer) => layer.frame === null);
     if (!this.isEmpty) {
@@ -478,6 +492,7 @@ export class Scene {
     this.events.drawn([0, 1, 2].map((axis) => [matrix[axis] ?? 0, matrix[4 + axis] ?? 0]));
     if (!this.isPrepared) return;
     this.isPrepared = false;
+    if (this.isWhole && !this.isEmpty && !this.isLost) this.detail.measure(this.canvas.get3DContext({}) as WebGL2RenderingContext, this.begun);
     this.rhythm.drawn();
   }
 }

@@ -1,6 +1,6 @@
 /** The picture with its scalar bars, and as a PNG. */
 import { download, element } from "../dom";
-import { colourMap } from "./colour";
+import { GREY, NO_NUMBER_TEXT, colourMap } from "./colour";
 import { valueAt } from "./ranges";
 import { within } from "../number";
 import type { Bar } from "./scene";
@@ -29,7 +29,7 @@ export function paint(context: CanvasRenderingContext2D, picture: HTMLCanvasElem
     const room = Math.max(98 * unit, context.measureText(title(bar)).width);
     // What has no room left of the others is not begun.
     if (right - room < 0) break;
-    paintBar(context, bar, title(bar), [right - room, down - 230 * unit], room, unit, ink, ground);
+    paintBar(context, bar, title(bar), [right - room, down - (bar.hasGaps ? 254 : 230) * unit], room, unit, ink, ground);
     right -= room + 32 * unit;
   }
 }
@@ -38,13 +38,18 @@ function paintBar(context: CanvasRenderingContext2D, bar: Bar, title: string, [l
   const [width, height] = [14 * unit, 190 * unit];
   context.fillStyle = ground;
   context.beginPath();
-  context.roundRect(left - 8 * unit, top - 28 * unit, room + 16 * unit, height + 40 * unit, 6 * unit);
+  context.roundRect(left - 8 * unit, top - 28 * unit, room + 16 * unit, height + (bar.hasGaps ? 64 : 40) * unit, 6 * unit);
   context.fill();
   context.fillStyle = ink;
   context.fillText(title, left, top - 16 * unit);
   for (let tick = 0; tick <= 5; tick++) {
     const value = valueAt(bar.range, tick / 5, bar.look.range.logarithmic);
     context.fillText(within(value, bar.look.range.logarithmic ? [0, value] : bar.range), left + width + 8 * unit, top + height * (1 - tick / 5));
+  }
+  if (bar.hasGaps) {
+    context.fillText(NO_NUMBER_TEXT, left + width + 8 * unit, top + height + 22 * unit);
+    context.fillStyle = GREY;
+    context.fillRect(left, top + height + 16 * unit, width, 12 * unit);
   }
   const { stops } = colourMap(bar.look.map);
   const gradient = context.createLinearGradient(0, top + height, 0, top);

@@ -4,8 +4,8 @@ import type { Look } from "../store/looks";
 import type { Layer } from "./layer";
 import type { Coloured, Range, Ranges } from "./ranges";
 
-/** The colours that some views have in common, and the range that they stand for. */
-export interface Bar { key: string; look: Look; views: string[]; range: Range }
+/** The colours that some views have in common, the range that they stand for, and whether there is also what is no number. */
+export interface Bar { key: string; look: Look; views: string[]; range: Range; hasGaps: boolean }
 
 /** Colours views by what they hold now; returns the bars of what is seen. What is hidden counts only where all that was does. */
 export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): Bar[] {
@@ -33,7 +33,7 @@ export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): 
     const seen = members.filter(({ isSeen }) => isSeen);
     if (!range || seen.length === 0) continue;
     for (const { layer } of seen) layer.paint(range);
-    bars.push({ key, look, range, views: seen.map(({ layer }) => layer.name) });
+    bars.push({ key, look, range, views: seen.map(({ layer }) => layer.name), hasGaps: seen.some(({ layer }) => layer.hasGaps) });
   }
   ranges.keep(remembered);
   return bars;

@@ -48,7 +48,7 @@ describe("the look of a view", () => {
   });
 
   it("has a range of which one end is typed, and the other stays as it is to the last bit", () => {
-    const bar = (range: [number, number]): void => panel.setBars([{ key: "", look: made.store.state.looks.cut!, range, views: ["cut"] }]);
+    const bar = (range: [number, number]): void => panel.setBars([{ key: "", look: made.store.state.looks.cut!, range, views: ["cut"], hasGaps: false }]);
     const type = (label: string, text: string): unknown => {
       const input = root().querySelector<HTMLInputElement>(`[aria-label="${label}"]`)!;
       input.value = text;

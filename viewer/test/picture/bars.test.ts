@@ -11,7 +11,7 @@ describe("a scalar bar", () => {
   let fixed: [readonly string[], Range][];
   let text: BarText;
   const root = (): HTMLElement => document.getElementById("bars")!;
-  const show = (range: Range): void => bars.show([{ key: "k", look, range, views: ["cut"] }]);
+  const show = (range: Range, hasGaps = false): void => bars.show([{ key: "k", look, range, views: ["cut"], hasGaps }]);
   beforeEach(() => {
     document.body.innerHTML = '<div id="bars"></div>';
     fixed = [];
@@ -31,6 +31,14 @@ describe("a scalar bar", () => {
     expect([fixed.length, high.getAttribute("aria-invalid"), high.title]).toEqual([1, "true", "“1,500” can be read in two ways: write 1500 or 1.5"]);
     show([0, 1]);
     expect([high.value, high.getAttribute("aria-invalid")]).toEqual(["1", "false"]);
+  });
+
+  it("says what grey is where some values are no numbers", () => {
+    const legend = (): HTMLElement => root().querySelector(".gaps")!;
+    show([0, 1]);
+    expect(legend().hidden).toBe(true);
+    show([0, 1], true);
+    expect([legend().hidden, legend().textContent]).toEqual([false, "no number"]);
   });
 
   it("has the title and the unit that the run has told last", () => {

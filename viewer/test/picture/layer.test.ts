@@ -8,6 +8,7 @@ import { Layer } from "../../src/picture/layer";
 import type { Piece } from "../../src/picture/layer";
 import { Ranges } from "../../src/picture/ranges";
 import { colour } from "../../src/picture/shared-colours";
+import { insteadOf } from "../../src/picture/surface-node";
 import { firstLook } from "../../src/store/looks";
 
 const POINTS = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0];
@@ -60,6 +61,42 @@ describe("a mesh that rests", () => {
     expect(parts.points.getMTime()).toBeGreaterThan(before[0]);
     expect(parts.edges.data.getMTime()).toBeGreaterThan(before[1]);
     expect(layer.bounds).toEqual([[0, 0, 0], [1, 1, 0.5]]);
+  });
+});
+
+describe("fewer triangles", () => {
+  it("are drawn of a view that has clusters, with its edges, until it has another topology", () => {
+    const asked: { answered: (clusters: unknown) => void; points: Float32Array; isGone: boolean }[] = [];
+    layer = new Layer("cut", "slice", layer.look, vtkRenderer.newInstance(), { want: (_, points, answered) => {
+      const wish = { answered: answered as (clusters: unknown) => void, points, isGone: false };
+      asked.push(wish);
+      return () => { wish.isGone = true; };
+    } });
+    parts = layer as unknown as Parts;
+    layer.setTopology(topology);
+    show(frame(1, [0, 1, 2, 3]));
+    show(frame(2, [0, 1, 2, 4]));
+    expect(asked.length).toBe(1);
+    expect(asked[0]!.points).toBe(layer.coordinates);
+    const drawn = (): unknown[] => [parts.surface, parts.edges].map(({ mapper }) => insteadOf(mapper));
+    layer.show(true);
+    expect(drawn()).toEqual([null, null]);
+    const clusters = { representatives: Uint32Array.from([0, 0, 2, 3]), triangles: Uint32Array.from([0, 2, 3]) };
+    const before = [parts.surface.data.getMTime(), parts.surface.mapper.getMTime()];
+    asked[0]!.answered(clusters);
+    layer.show(true);
+    expect(drawn()[0]).toEqual({ triangles: clusters.triangles });
+    // Side 0-1 is lost and 1-2 is the diagonal now; each is there once.
+    const { lines } = drawn()[1] as { lines: Uint32Array };
+    expect(Array.from({ length: lines.length / 2 }, (_, i) => [...lines.subarray(2 * i, 2 * i + 2)].sort().join("-")).sort()).toEqual(["0-2", "0-3", "2-3"]);
+    layer.show();
+    expect(drawn()).toEqual([null, null]);
+    // Nothing is made anew for it.
+    expect([parts.surface.data.getMTime(), parts.surface.mapper.getMTime()]).toEqual(before);
+    layer.setTopology({ ...topology, topology: "2" });
+    expect(asked[0]!.isGone).toBe(true);
+    layer.show(true);
+    expect(drawn()).toEqual([null, null]);
   });
 });
 
@@ -126,8 +163,12 @@ describe("colours", () => {
     expect((parts.surface.mapper.getLookupTable() as unknown as { getNanColor(): number[] }).getNanColor()).toEqual([0.5, 0.5, 0.5, 1]);
     const isGrey = (): boolean[] => [...parts.surface.data.getPointData().getScalars().getData()].map(Number.isNaN);
     expect(isGrey()).toEqual([false, false, false, true]);
+    // The bar says so, as long as there are such values.
+    expect(colour([layer], new Ranges(), false).map(({ hasGaps }) => hasGaps)).toEqual([true]);
+    show(frame(2, [0, 1, 2, 3]));
+    expect(colour([layer], new Ranges(), false).map(({ hasGaps }) => hasGaps)).toEqual([false]);
     // Where there is none at all, nothing of the frame before is left.
-    expect(layer.setData(frame(2, [NaN, NaN, NaN, NaN]))).toBeNull();
+    expect(layer.setData(frame(3, [NaN, NaN, NaN, NaN]))).toBeNull();
     colour([layer], new Ranges(), false);
     expect(isGrey()).toEqual([true, true, true, true]);
   });

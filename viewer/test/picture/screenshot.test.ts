@@ -19,7 +19,7 @@ function context(width: number, height: number) {
 }
 const picture = (width: number, height: number) => ({ width, height }) as HTMLCanvasElement;
 const view = { name: "cut", kind: "slice" };
-const bar = (key: string): Bar => ({ key, views: ["cut"], range: [0, 1], look: firstLook(view, [view], []) });
+const bar = (key: string): Bar => ({ key, views: ["cut"], range: [0, 1], look: firstLook(view, [view], []), hasGaps: false });
 
 test("titles of bars lie within the picture, and beside each other", () => {
   const { context: canvas, texts } = context(800, 800);
@@ -29,6 +29,14 @@ test("titles of bars lie within the picture, and beside each other", () => {
   expect(found.length).toBe(3);
   for (const { right } of texts) expect(right).toBeLessThanOrEqual(800);
   for (let i = 1; i < found.length; i++) expect(found[i - 1]!.right).toBeLessThan(found[i]!.left);
+});
+
+test("grey is named where some values are no numbers, within the picture", () => {
+  const { context: canvas, texts } = context(800, 800);
+  paint(canvas, picture(800, 800), [bar("a"), { ...bar("b"), hasGaps: true }], ({ key }) => key, "black", "white");
+  const found = texts.filter(({ text }) => text === "no number");
+  expect(found.length).toBe(1);
+  expect(found[0]!.line).toBeLessThan(790);
 });
 
 test("a bar for which a narrow picture has no room is left out", () => {
