@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use numpy::PyUntypedArray;
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
 use tombolo::deform::mesh::{CellType, Vector};
@@ -101,7 +102,11 @@ fn entries<'py>(given: &Given<'py>, what: &str, expected: &str) -> Read<Vec<[Giv
 }
 
 /// A part of a mesh; `None` where it is left out.
-fn part<'py>(mesh: &Given<'py>, what: &str, name: &'static str) -> Read<Option<Given<'py>>> {
+fn part<'py>(
+    mesh: &Given<'py>,
+    what: &str,
+    name: &Bound<'py, PyString>,
+) -> Read<Option<Given<'py>>> {
     let found = match mesh.cast::<PyDict>() {
         Ok(dict) => dict.get_item(name).map_err(python(what))?,
         Err(_) => Some(mesh.getattr(name).map_err(|_| {
@@ -308,11 +313,13 @@ impl Lender {
         let what = format!("channel '{channel}', field '{field}'");
         // A `tombolo.Field` states where its values are.
         let is_array = value.cast::<PyUntypedArray>().is_ok();
-        let association = if is_array { Ok(None) } else { value.getattr_opt("association") };
+        let association =
+            if is_array { Ok(None) } else { value.getattr_opt(intern!(value.py(), "association")) };
         let stated = match association.map_err(python(&what))? {
-            Some(association) => {
-                Some((value.getattr("values").map_err(python(&what))?, association))
-            }
+            Some(association) => Some((
+                value.getattr(intern!(value.py(), "values")).map_err(python(&what))?,
+                association,
+            )),
             None => None,
         };
         let components =
@@ -346,6 +353,7 @@ impl Lender {
     }
 
     fn channel<'call>(&mut self, channel: String, mesh: &Given<'_>) -> Read<Channel<'call>> {
+        let py = mesh.py();
         let path = format!("channel '{channel}'");
         if let Ok(dict) = mesh.cast::<PyDict>() {
             for key in dict.keys() {
@@ -359,7 +367,7 @@ impl Lender {
                 }
             }
         }
-        let points = part(mesh, &path, "points")?;
+        let points = part(mesh, &path, intern!(py, "points"))?;
         let points = points.ok_or_else(|| argument(&path, "no points", "an array (n, 3)"))?;
         let what = format!("{path}, points");
         let axes = self.components(&points, &what)?;
@@ -369,29 +377,29 @@ impl Lender {
         }
         let coordset = Coordset::Explicit { axes };
         let vertices = coordset.vertex_count();
-        let cells = part(mesh, &path, "cells")?;
+        let cells = part(mesh, &path, intern!(py, "cells"))?;
         let topology = self.topology(cells.as_ref(), vertices, &format!("{path}, cells"))?;
         let counts = (vertices, topology.cell_count());
         let mut fields = Vec::new();
-        if let Some(given) = part(mesh, &path, "fields")? {
+        if let Some(given) = part(mesh, &path, intern!(py, "fields"))? {
             let what = format!("{path}, fields");
             for entry in entries(&given, &what, "a dict from names to arrays")? {
                 fields.push(self.field(&channel, &entry, counts)?);
             }
         }
-        let (faces, feature_names) = match part(mesh, &path, "faces")? {
+        let (faces, feature_names) = match part(mesh, &path, intern!(py, "faces"))? {
             Some(given) => self.faces(&given, &format!("{path}, faces"))?,
             None => Default::default(),
         };
-        let mut list = |name: &'static str| -> Read<Option<Array<'call>>> {
+        let mut list = |name: &Bound<'_, PyString>| -> Read<Option<Array<'call>>> {
             let given = part(mesh, &path, name)?;
             given.map(|given| self.list(&given, &format!("{path}, {name}"))).transpose()
         };
         let roles = Roles {
-            ghosts: list("ghost_cells")?,
-            global_vertices: list("global_vertices")?,
-            global_cells: list("global_cells")?,
-            vertex_features: list("vertex_features")?,
+            ghosts: list(intern!(py, "ghost_cells"))?,
+            global_vertices: list(intern!(py, "global_vertices"))?,
+            global_cells: list(intern!(py, "global_cells"))?,
+            vertex_features: list(intern!(py, "vertex_features"))?,
         };
         let label = Label::Words(path);
         let domain = Domain { coordset, topology, fields, faces, roles, label: label.clone() };
@@ -419,9 +427,10 @@ impl Lender {
 
     /// The channels of a step: one mesh, or a dict from names to meshes.
     pub(crate) fn channels<'call>(&mut self, given: &Given<'_>) -> Read<Channels<'call>> {
+        let points = intern!(given.py(), "points");
         let is_mesh = match given.cast::<PyDict>() {
-            Ok(dict) => dict.contains("points").unwrap_or(false),
-            Err(_) => given.hasattr("points").unwrap_or(false),
+            Ok(dict) => dict.contains(points).unwrap_or(false),
+            Err(_) => given.hasattr(points).unwrap_or(false),
         };
         if is_mesh {
             return Ok(Channels(vec![self.channel("mesh".to_owned(), given)?]));
