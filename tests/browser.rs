@@ -5,9 +5,10 @@
 use std::path::Path;
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use tombolo_tests::{Proxy, Run, Small, driving, free_ports, program, project};
+use tombolo_tests::{PATIENCE, Proxy, Run, Small, driving, free_ports, program, project};
 
 /// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
@@ -162,7 +163,19 @@ fn runs_behind_a_relay_and_a_proxy_in_a_browser() {
         let run = Run::flow(&small.arguments(&arguments));
         (small, run)
     });
-    let links = runs.each_mut().map(|(_, run)| run.line("its link", driving));
+    // Once the relay is reached, the file says how the run is reached through the proxy.
+    let public = format!("https://localhost:{public_port}/");
+    let links = runs.each_mut().map(|(_, run)| {
+        let line = run.line("its link", |line| driving(line).map(|_| line.to_owned()));
+        let until = Instant::now() + PATIENCE;
+        loop {
+            if let Some(link) = driving(&line).filter(|link| link.starts_with(&public)) {
+                break link;
+            }
+            assert!(Instant::now() < until, "the relay is not reached:\n{}", run.text());
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    });
     let page = std::fs::read_to_string(directory.path().join("relay.link")).expect("its link");
     let page = page.trim().strip_prefix("page: ").expect("a link").to_owned();
     let variables = [

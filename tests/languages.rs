@@ -370,7 +370,7 @@ fn no_rank_of_tombolo_h_waits_for_one_that_goes_wrong() {
     succeed(compile.args(["-Wall", "-Wextra", "-Werror"]).args(flags.split_whitespace()));
     let mut run = Command::new("timeout");
     succeed(
-        run.args(["60", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"])
+        run.args(["900", "mpirun", "--oversubscribe", "--allow-run-as-root", "-n", "3"])
             .arg(&program),
     );
 }

@@ -69,8 +69,8 @@ fn a_journal_plays_back_to_the_same_bits() {
     let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     driver.send(&json!({"id": "first", "order": pinch(0.8)}));
-    driver
-        .wait_for("order", |order| order["status"] == "accepted" || order["status"] == "computing");
+    // What is planned before the run goes on is carried out before it ends.
+    driver.wait_for("order", |order| order["status"] == "applying");
     driver.resume();
     let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
@@ -118,7 +118,7 @@ fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
     // The second comes while the mesh is on its way to the first, the third is never carried out.
     driver.wait_for("status", |status| status["cycle"] == 9 && status["paused"] == true);
     driver.send(&json!({"id": "second", "order": pinch(0.8)}));
-    driver.wait_for("order", |order| order["id"] == "second" && order["status"] == "accepted");
+    driver.wait_for("order", |order| order["id"] == "second" && order["status"] == "applying");
     driver.send(&json!({"id": "third", "order": pinch(0.95)}));
     driver.send(&json!({"id": "not", "cancel": {"order": "third"}}));
     driver.resume();

@@ -75,6 +75,14 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
         while killed < 5 && run.is_running() && std::fs::read(&state).ok() == before {
             std::thread::sleep(Duration::from_millis(1));
         }
+        if killed == 0 && !run.is_running() {
+            // It was quicker than the look at it.
+            let (status, text) = run.finish(PATIENCE);
+            assert!(status.success(), "{text}");
+            std::fs::remove_dir_all(small.path("out")).expect("its files");
+            std::fs::create_dir_all(small.path("out")).expect("a folder");
+            continue;
+        }
         if killed == 5 || !run.is_running() {
             let (status, text) = run.finish(PATIENCE);
             assert!(status.success(), "after {killed} kills: {text}");
@@ -85,7 +93,6 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
         drop(run);
         killed += 1;
     }
-    assert!(killed > 0, "it was never killed");
     assert!(results(&small) == results(&whole), "after {killed} kills it differs");
     let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
     assert!(journal.contains("\"checkpoint\""), "{journal}");

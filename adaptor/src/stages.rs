@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
+    time::Duration,
 };
 
 use serde_json::{Map, Value, json};
@@ -58,6 +59,8 @@ struct LiveView {
 
 /// Tables that a run may begin, of which each stays open.
 const TABLES: usize = 256;
+/// How long what is saved waits for files that are still being written.
+const LONGEST_FLUSH: Duration = Duration::from_secs(10);
 
 /// The requests of pipelines besides what was sent and written.
 #[derive(Default)]
@@ -190,8 +193,10 @@ impl Pipelines {
         Ok(())
     }
 
-    /// Writes down what the pipelines have come to.
+    /// Writes down what the pipelines have come to, once their files of all steps so far are
+    /// written.
     pub(crate) fn save(&self, writer: &mut communicator::Writer) {
+        self.writer.flush(LONGEST_FLUSH);
         self.runner.save(writer);
     }
 

@@ -7,9 +7,10 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex,
-        mpsc::{Receiver, SyncSender, sync_channel},
+        mpsc::{Receiver, SendError, SyncSender, TrySendError, sync_channel},
     },
     thread::JoinHandle,
+    time::{Duration, Instant},
 };
 
 use tombolo_pipelines::{
@@ -48,10 +49,17 @@ pub(crate) enum Content {
     Row(Arc<Table>, u64, Vec<f64>),
 }
 
+/// What the thread is asked for.
+enum Task {
+    Write(Job),
+    /// To let go of this, once all before it is written.
+    Answer(SyncSender<()>),
+}
+
 /// Starts its thread with the first file.
 #[derive(Default)]
 pub(crate) struct Writer {
-    jobs: Option<SyncSender<Job>>,
+    tasks: Option<SyncSender<Task>>,
     thread: Option<JoinHandle<()>>,
     faults: Arc<Mutex<Vec<String>>>,
     told: usize,
@@ -65,14 +73,14 @@ impl Writer {
     }
 
     pub(crate) fn write(&mut self, job: Job) {
-        if self.jobs.is_none() {
-            let (jobs, next) = sync_channel(WAITING);
+        if self.tasks.is_none() {
+            let (tasks, next) = sync_channel(WAITING);
             let (faults, since) = (Arc::clone(&self.faults), self.since);
             let spawned = std::thread::Builder::new()
                 .name("tombolo-write".into())
                 .spawn(move || work(&next, &faults, since));
             match spawned {
-                Ok(thread) => (self.jobs, self.thread) = (Some(jobs), Some(thread)),
+                Ok(thread) => (self.tasks, self.thread) = (Some(tasks), Some(thread)),
                 Err(error) => {
                     return note(
                         &self.faults,
@@ -81,12 +89,28 @@ impl Writer {
                 }
             }
         }
-        if let Some(Err(lost)) = self.jobs.as_ref().map(|jobs| jobs.send(job)) {
-            note(
-                &self.faults,
-                format!("{}: the thread that writes has ended", lost.0.path.display()),
-            );
+        let sent = self.tasks.as_ref().map(|tasks| tasks.send(Task::Write(job)));
+        if let Some(Err(SendError(Task::Write(job)))) = sent {
+            let path = job.path.display();
+            note(&self.faults, format!("{path}: the thread that writes has ended"));
         }
+    }
+
+    /// Waits until all that was given so far is written, at most so long.
+    pub(crate) fn flush(&self, longest: Duration) {
+        let Some(tasks) = &self.tasks else { return };
+        let until = Instant::now() + longest;
+        let (answer, answered) = sync_channel(0);
+        let mut sent = tasks.try_send(Task::Answer(answer));
+        while let Err(TrySendError::Full(task)) = sent {
+            if Instant::now() > until {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            sent = tasks.try_send(task);
+        }
+        // It is never sent: the thread lets go of it.
+        let _ = answered.recv_timeout(until.saturating_duration_since(Instant::now()));
     }
 
     /// Faults that were not told yet.
@@ -99,7 +123,7 @@ impl Writer {
 
     /// Waits until all is written; all faults.
     pub(crate) fn finish(&mut self) -> Vec<String> {
-        self.jobs = None;
+        self.tasks = None;
         if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
             note(&self.faults, "the thread that writes files has failed".into());
         }
@@ -125,14 +149,15 @@ struct Written {
     since: Option<u64>,
 }
 
-fn work(jobs: &Receiver<Job>, faults: &Mutex<Vec<String>>, since: Option<Moment>) {
+fn work(tasks: &Receiver<Task>, faults: &Mutex<Vec<String>>, since: Option<Moment>) {
     let mut written = Written {
         series: AllSeries::new(since.map(|since| since.time)),
         databases: HashMap::new(),
         tables: HashMap::new(),
         since: since.map(|since| since.cycle),
     };
-    while let Ok(job) = jobs.recv() {
+    while let Ok(task) = tasks.recv() {
+        let Task::Write(job) = task else { continue };
         let outcome = match &job.content {
             Content::Extract(extract, membership) => {
                 written.extract(&job, extract, membership.as_ref())

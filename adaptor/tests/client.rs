@@ -36,6 +36,8 @@ struct Run {
     over: Arc<AtomicBool>,
     /// Milliseconds from step to step.
     rest: Arc<AtomicU64>,
+    /// Those that the solver rests for now; 0 while it is in a call.
+    rests_for: Arc<AtomicU64>,
     thread: Option<JoinHandle<Report>>,
 }
 
@@ -55,15 +57,28 @@ impl Run {
         let is_over = Arc::clone(&over);
         let rest = Arc::new(AtomicU64::new(2));
         let resting = Arc::clone(&rest);
+        let rests_for = Arc::new(AtomicU64::new(0));
+        let resting_for = Arc::clone(&rests_for);
         solver.step();
         let run = move || {
             while !solver.stopped && !is_over.load(Ordering::Relaxed) {
                 solver.step();
-                std::thread::sleep(Duration::from_millis(resting.load(Ordering::Relaxed)));
+                let begun = Instant::now();
+                // A rest may be made longer, or ended, while it is taken.
+                loop {
+                    let rest = resting.load(Ordering::Relaxed);
+                    resting_for.store(rest, Ordering::Relaxed);
+                    let left = Duration::from_millis(rest).saturating_sub(begun.elapsed());
+                    if left.is_zero() || is_over.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    std::thread::sleep(left.min(Duration::from_millis(5)));
+                }
+                resting_for.store(0, Ordering::Relaxed);
             }
             solver.finish()
         };
-        Self { link, address, over, rest, thread: Some(std::thread::spawn(run)) }
+        Self { link, address, over, rest, rests_for, thread: Some(std::thread::spawn(run)) }
     }
 
     fn end(mut self) -> Report {
@@ -532,15 +547,25 @@ fn the_program_lists_what_waits_and_replaces_it() {
     let watches = Options { watches: true, ..Options::default() };
     let watching = Client::connect(&run.link, &watches).expect("connected");
     // All of it comes while the solver computes one step.
-    run.rest.store(4000, Ordering::Relaxed);
-    let cycle = watching.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
-    watching.wait_for_status(PATIENCE, |status| status.cycle > cycle + 1).expect("a step");
+    let rest = 900_000;
+    run.rest.store(rest, Ordering::Relaxed);
+    while run.rests_for.load(Ordering::Relaxed) != rest {
+        std::thread::sleep(Duration::from_millis(2));
+    }
     let second = given("order", &["second.json"]);
     let (code, said, _) = tombolo(directory.path(), &["queue", link.as_str()]);
     let expected = format!("order {second}: waits for the solver's next call, since cycle");
     assert!(code == 0 && said.contains(&expected), "{said}");
-    let better = given("replace", &[&second, "better.json"]);
-    run.rest.store(2, Ordering::Relaxed);
+    // The program waits for the next call, which comes once the order is there.
+    let better = std::thread::scope(|scope| {
+        let better = scope.spawn(|| given("replace", &[&second, "better.json"]));
+        until(&watching, "the better order", |told| match &told.event {
+            Event::Order(order) if order.id != second => Some(()),
+            _ => None,
+        });
+        run.rest.store(2, Ordering::Relaxed);
+        better.join().expect("no panic")
+    });
     let begun = Instant::now();
     while tombolo(directory.path(), &["queue", link.as_str()]).1 != "no order waits\n" {
         assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");

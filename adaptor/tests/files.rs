@@ -89,6 +89,23 @@ fn a_series_names_a_file_once_that_is_overwritten() {
     assert!(text.contains("timestep=\"0.12\""), "the time is that of the newest: {text}");
 }
 
+/// A run that is killed behind a checkpoint and restarted does not write them again.
+#[test]
+fn a_checkpoint_waits_for_the_files_and_rows_of_its_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipelines = r#"[{"name": "whole", "stages": [{"write": {"file": "{cycle:1}.vtu"}}]},
+        {"name": "health", "stages": [{"quality": {}}, {"csv": {"file": "health.csv"}}]}]"#;
+    let mut solver = Solver::of_box([16, 16, 16], settings(pipelines, folder.path()));
+    for cycle in 0..8 {
+        solver.step();
+        let _ = solver.adaptor.checkpoint();
+        assert!(folder.path().join(format!("{cycle}.vtu")).exists(), "{cycle}");
+        let rows = read_to_string(folder.path().join("health.csv")).unwrap();
+        assert!(rows.lines().last().unwrap().starts_with(&format!("{cycle},")), "{rows}");
+    }
+    solver.finish();
+}
+
 #[test]
 fn a_restart_goes_on_with_series_and_databases() {
     let folder = tempfile::tempdir().unwrap();

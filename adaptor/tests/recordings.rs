@@ -72,7 +72,7 @@ fn a_run_is_recorded_without_a_viewer_and_without_a_server() {
                 cycles.entry(frame.view).or_default().push(frame.cycle);
             }
         }
-        assert!(cycles["boundary"].len() > 10 && cycles["middle"].len() > 3, "{cycles:?}");
+        assert!(cycles["boundary"].len() > 2 && cycles["middle"].len() > 1, "{cycles:?}");
         assert!(cycles.values().all(|cycles| cycles.is_sorted()));
         // The next run goes on below.
         let before = std::fs::read(&file).unwrap();
@@ -120,6 +120,23 @@ fn a_recording_has_a_limit_and_the_run_goes_on() {
     all(&file);
 }
 
+/// The cycle and the moment of a picture of the boundary in the middle of those behind the order.
+fn changed_picture(file: &Path) -> (u64, f64) {
+    let (mut decoder, mut is_changed, mut shown) = (Decoder::new(), false, Vec::new());
+    for recorded in all(file) {
+        match &recorded.message {
+            RecordedMessage::Frame { bytes, .. } => {
+                let frame = decoder.decode(bytes).expect("every frame can be read");
+                if is_changed && frame.view == "boundary" {
+                    shown.push((frame.cycle, recorded.moment.seconds));
+                }
+            }
+            RecordedMessage::Text(text) => is_changed |= text.starts_with("{\"stack\""),
+        }
+    }
+    shown[shown.len() / 2]
+}
+
 #[test]
 fn viewers_go_through_a_recording() {
     let output = tempfile::tempdir().unwrap();
@@ -153,7 +170,7 @@ fn viewers_go_through_a_recording() {
     let frames = viewer.decoded();
     assert!(frames.iter().any(|frame| frame.view == "boundary" && frame.cycle > 40));
     // Back: the picture is that of the moment, and stays while it is paused.
-    let seconds = 0.4 * last.seconds;
+    let (cycle, seconds) = changed_picture(&file);
     viewer.seen.clear();
     viewer.send(&json!({"play": {"paused": true, "seek": {"seconds": seconds}}}));
     let hello = viewer.wait_for("hello", |_| true);
@@ -167,7 +184,7 @@ fn viewers_go_through_a_recording() {
     let newest =
         shown.iter().filter(|frame| frame.view == "boundary").map(|frame| frame.cycle).max();
     let newest = newest.expect("the view is shown at once");
-    assert!(newest > 5 && newest < 40, "{newest}");
+    assert_eq!(newest, cycle);
     viewer.look_for("nothing", Duration::from_millis(600), |_| true);
     assert!(viewer.decoded().is_empty());
     viewer.send(&json!({"play": {"seek": {"cycle": 0}, "paused": false, "speed": 100}}));

@@ -521,11 +521,11 @@ fn a_solver_may_wait_for_its_first_viewer() {
     let change = language::parse_json(health, "change").expect("a change");
     solver.adaptor.change_pipelines(change).expect("it goes with the others");
     let address = socket_url(&solver.adaptor);
+    let begun = Instant::now();
     let late = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(300));
         Viewer::try_connect(&address).expect("connected")
     });
-    let begun = Instant::now();
     solver.step();
     assert!(begun.elapsed() > Duration::from_millis(250), "it did not wait");
     let mut viewer = late.join().expect("a viewer");

@@ -112,7 +112,10 @@ const steps = [
     await page.keyboard.press("Control+Enter");
     await outcome("applied at cycle");
     await anna.until("the view", ({ views }) => views.slice?.triangles > 0);
-    check(!(await names(anna)).includes(undefined) && (await names(anna)).includes("slice"), `the run has ${await names(anna)}`);
+    await anna.holds("the run's list", () => {
+      const names = window.tombolo.pipelines.map(({ name }) => name);
+      return !names.includes(undefined) && names.includes("slice");
+    });
     await anna.picture("applied");
   }],
   ["a misspelt key is marked with the nearest name, and Apply is off until it is put right", async () => {

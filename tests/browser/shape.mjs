@@ -161,6 +161,8 @@ const steps = [
     check(seen.role === "watcher", `the second viewer is ${seen.role}`);
     for (const selector of ["#apply", "#undo", "#pause"]) check(await second.page.locator(selector).isDisabled(), `a watcher can press ${selector}`);
     check(/ask to steer/.test(await second.page.getAttribute("#pause", "title")), "the reason is not said");
+    // So that the driver is not taken for gone, however long the second page took.
+    await page.mouse.move(5, 5);
     await second.page.click("#wheel");
     await page.waitForFunction(() => !document.getElementById("asked").hidden);
     await first.picture("asked");

@@ -89,6 +89,8 @@ const steps = [
     }
     check(/^watching · Anna \(c\d+\) steers$/.test(await bo.text("#role")), `the bar says "${await bo.text("#role")}"`);
     await bo.page.click("#people-close");
+    // So that the driver is not taken for gone, however long the other pages took.
+    await anna.page.mouse.move(5, 5);
     await bo.page.click("#wheel");
     await anna.page.waitForSelector("#asked:not([hidden])");
     check(/^<i>Bo<\/i> \(c\d+\) asks to steer\.$/.test(await anna.text("#asked-text")), `the page says "${await anna.text("#asked-text")}"`);

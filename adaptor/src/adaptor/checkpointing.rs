@@ -20,7 +20,8 @@ impl Adaptor {
     ///
     /// It copies no coordinates. The journal gets a line that says where it was made, and this waits
     /// until that line and all before it are on disk, two seconds at most: a run that is killed and
-    /// restarted has lost none of them.
+    /// restarted has lost none of them. Files and rows that pipelines write at steps so far are
+    /// waited for as well, ten seconds at most: the run that goes on does not write them again.
     ///
     /// On several ranks it is collective, and each rank has the checkpoint of its own part.
     #[must_use]

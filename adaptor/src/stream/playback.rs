@@ -453,7 +453,9 @@ impl Player {
             time: self.moment.time,
             speed: self.speed,
             paused: self.is_paused,
-            at_end: seconds >= self.recording.last().seconds,
+            // Messages that wait for a slow viewer come before its end.
+            at_end: seconds >= self.recording.last().seconds
+                && self.recording.next_moment().is_none(),
         };
         self.put(Wire::text(json!({ "play": progress }).to_string()))
     }

@@ -107,6 +107,7 @@ class Solver:
         self.stopped = False
         self.end = threading.Event()
         self.step = step
+        self.rests_for = 0.0
         self.adaptor = tombolo.Adaptor(configuration, parameters={"heating": (1, 0, 10)}, **settings)
         self.link = self.adaptor.link
         self.thread = threading.Thread(target=self.solve, daemon=True)
@@ -130,10 +131,18 @@ class Solver:
                     if steering.motion is not None:
                         self.points[:] = steering.motion.coordinates
                     self.heating.append(steering.parameters["heating"])
-                    time.sleep(self.step)
+                    self.rest()
                     cycle += 1
         except Exception as error:
             self.error = error
+
+    def rest(self):
+        """Rest until the next step; a rest may be made longer, or ended, while it is taken."""
+        begun = time.monotonic()
+        while (left := self.step - (time.monotonic() - begun)) > 0 and not self.end.is_set():
+            self.rests_for = self.step
+            time.sleep(min(left, 0.005))
+        self.rests_for = 0.0
 
     def close(self):
         self.end.set()

@@ -248,7 +248,8 @@ def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
     order.Give()
     wait(lambda: rows().get("status", "").startswith("applied"))
     wait(lambda: rows()["stack"] == "1 edits")
-    assert solver.points[:, 2].max() == pytest.approx(0.8)
+    # It is told before the solver has taken the coordinates.
+    wait(lambda: solver.points[:, 2].max() == pytest.approx(0.8))
     order.Undo()
     wait(lambda: rows()["stack"] == "0 edits" and rows()["status"].startswith("applied"))
     wait(lambda: np.array_equal(solver.points, begin))

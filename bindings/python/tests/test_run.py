@@ -106,16 +106,16 @@ def test_an_order_is_given_forecast_and_taken_back(solver, run):
     run.wait_for(lambda: run.status.cycle > order.cycle_applied + 4, 30)
     assert solver.points[:, 2].max() == pytest.approx(0.8)
     assert run.stack and run.orders[-1].id == order.id
-    run.undo().wait(60)
-    run.wait_for_cycle(run.status.cycle + 3, 30)
+    undone = run.undo().wait(60)
+    run.wait_for(lambda: run.status.cycle > undone.cycle_applied + 4, 30)
     assert np.array_equal(solver.points, solver.reference)
 
 
 def test_an_order_takes_the_place_of_one_that_waits(solver, run):
     run.wait_for(lambda: run.features, 30)
     # Both come while the solver computes one step.
-    solver.step = 3.0
-    run.wait_for_cycle(run.status.cycle + 2, 30)
+    solver.step = 900.0
+    wait(lambda: solver.rests_for == 900.0)
     second = run.order([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.4]}}])
     better = run.order(SQUEEZE, replaces=second).wait(60, until="accepted")
     solver.step = 0.002
@@ -157,8 +157,8 @@ def test_a_displacement_made_elsewhere_is_an_order(solver, run):
     assert set(surface.faces_of("top")) <= set(range(len(surface.offsets) - 1))
     values = np.zeros_like(surface.points)
     values[:, 0] = 0.05 * np.sin(np.pi * surface.points[:, 2])
-    run.order([{"displacement": {"vertices": surface.vertices, "values": values}}]).wait(60)
-    run.wait_for_cycle(run.status.cycle + 3, 30)
+    order = run.order([{"displacement": {"vertices": surface.vertices, "values": values}}]).wait(60)
+    run.wait_for(lambda: run.status.cycle > order.cycle_applied + 4, 30)
     moved = solver.points[surface.vertices] - surface.points
     np.testing.assert_allclose(moved, values, atol=1e-12)
 

@@ -30,7 +30,8 @@ export class Stream {
   constructor(target: { address: string; probe: string }, worker: DecodeWorker, surroundings?: Surroundings) {
     this.connection = new Connection(target, {
       state: (state, explanation) => {
-        if (state !== "connected") {
+        // Behind the end of a run nothing follows: what has come of it is still shown.
+        if (state !== "connected" && state !== "ended") {
           this.decoder.clear();
           this.unacknowledged = 0;
         }

@@ -66,6 +66,16 @@ describe("the stream", () => {
     expect(explained[1]).toBe(explained[0]);
   });
 
+  it("still shows what has come of a run that has ended", () => {
+    const { stream, heard, listen, decode, bring } = setUp();
+    listen();
+    bring(1, 2);
+    stream.connection.stop();
+    decode();
+    decode();
+    expect(heard).toEqual(["connected", "alive", "alive", "ended", "frame 1", "frame 2"]);
+  });
+
   it("acknowledges nothing of a connection that is gone", async () => {
     const { stream, sockets, listen, decode, bring, acknowledged } = setUp();
     bring(1);
