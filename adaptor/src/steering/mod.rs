@@ -28,6 +28,7 @@ mod source;
 mod stack;
 mod steerer;
 mod timed;
+mod together;
 mod worker;
 
 use std::{sync::LazyLock, time::Instant};
@@ -48,6 +49,7 @@ pub(crate) use source::Source;
 pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::Timed;
+pub(crate) use together::taken_back;
 
 /// Seconds since the first call of this function: the clock of a
 /// [`Shaper`](tombolo_deform::shape::Shaper).

@@ -18,6 +18,10 @@ use crate::mesh::{Domain, Mesh, Vector};
 use crate::number::real;
 use crate::parallel;
 
+/// Shapes of cells that are looked at between two places where it can be given up: on several ranks
+/// these must meet to know.
+const TOGETHER: usize = 1 << 26;
+
 /// The quality along a path that the guard lets through.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PathQuality {
@@ -109,10 +113,25 @@ pub fn judge_unless(
     let (path, floor) = Path::new(&domain, start, end, guard, cancellation);
     // Here too: a rank without cells has no chunk to look before.
     path.require_wanted()?;
-    let look = |range| (!cancellation.is_cancelled()).then(|| path.look(range, fractions));
+    let look = |range: std::ops::Range<usize>| {
+        (!cancellation.is_cancelled()).then(|| path.look(range, fractions))
+    };
     let mut total = Part::new(fractions.len());
-    for part in parallel::map_chunks(mesh.cells().len(), CHUNK, look) {
-        total.merge(part.ok_or(Refusal::Cancelled)?);
+    let (cells, is_alone) = (mesh.cells().len(), domain.communicator().size() == 1);
+    let groups = path.most_cells.saturating_mul(fractions.len()).div_ceil(TOGETHER).max(1);
+    let group = cells.div_ceil(CHUNK).div_ceil(groups) * CHUNK;
+    for index in 0..groups {
+        if index > 0 && !is_alone {
+            domain.communicator().all(true);
+            path.require_wanted()?;
+        }
+        let (from, to) = ((index * group).min(cells), ((index + 1) * group).min(cells));
+        let parts = parallel::map_chunks(to - from, CHUNK, |range| {
+            look(from + range.start..from + range.end)
+        });
+        for part in parts {
+            total.merge(part.ok_or(Refusal::Cancelled)?);
+        }
     }
     if domain.communicator().size() > 1 {
         total = total.gathered(&**domain.communicator());
@@ -239,6 +258,8 @@ struct Path<'a> {
     floor: f64,
     domain: &'a Domain,
     cancellation: &'a Cancellation,
+    /// The cells of the rank that has most of them.
+    most_cells: usize,
 }
 
 /// The findings in some of the cells.
@@ -358,11 +379,19 @@ impl<'a> Path<'a> {
     ) -> (Self, f64) {
         let mesh = domain.mesh();
         let measure = Measure::new(mesh.cells());
-        let mut least = [least_scaled_jacobian(&measure, mesh.points())];
+        let cells = mesh.cells().len();
+        let mut least = [least_scaled_jacobian(&measure, mesh.points()), -real(cells)];
         domain.communicator().reduce(Reduction::Minimum, &mut least);
-        let floor = guard.min_scaled_jacobian.min(least[0]);
+        let [least, fewest] = least;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count of cells"
+        )]
+        let most_cells = -fewest as usize;
+        let floor = guard.min_scaled_jacobian.min(least);
         let with_slack = floor - 1e-9 * floor.abs();
-        (Self { measure, start, end, floor: with_slack, domain, cancellation }, floor)
+        (Self { measure, start, end, floor: with_slack, domain, cancellation, most_cells }, floor)
     }
 
     fn require_wanted(&self) -> Result<(), Refusal> {
