@@ -11,14 +11,14 @@ use crate::quality::Otherwise;
 use crate::shapes::box_of_tets;
 
 fn mesh() -> Mesh {
-    box_of_tets([3, 3, 6], [0.0; 3], [1.0, 1.0, 2.0])
+    box_of_tets([2, 2, 4], [0.0; 3], [1.0, 1.0, 2.0])
 }
 
 /// The ends of these orders are not reached by one solve: the first by sub-steps, some of which
 /// are untangled, the second not at all.
 fn orders() -> [Vec<Edit>; 2] {
     let turned = json!([{"rotate": {
-        "features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 150}}]);
+        "features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 120}}]);
     let beyond = json!([{"translate": {
         "features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -2.5], "harmonic_order": 1}}]);
     [stack(turned), stack(beyond)]
@@ -49,14 +49,7 @@ fn outcome(plan: Result<Plan, Refused>) -> Outcome {
 fn given_up_everywhere(fresh: &dyn Fn() -> Shaper, tried: &dyn Fn(usize) -> Vec<usize>) {
     for edits in orders() {
         let mut shaper = fresh();
-        let begun = std::time::Instant::now();
         let expected = outcome(shaper.plan(&request(&shaper, &edits)));
-        eprintln!(
-            "{:?} {:?} {:?}",
-            begun.elapsed(),
-            shaper.cancellation().looks(),
-            expected.as_ref().map(|w| w.len())
-        );
         let ranks = Arc::clone(shaper.domain().communicator());
         let is_first = ranks.rank() == 0;
         let looks = ranks.most(if is_first { shaper.cancellation().looks() } else { 0 });
@@ -85,8 +78,8 @@ fn a_plan_is_given_up_at_each_look_and_made_anew_to_the_same_bits() {
     let mesh = mesh();
     // Iterations of a solve look very often, and are all alike.
     let tried = |looks: usize| {
-        let step = looks.div_ceil(1);
-        (1..=looks).filter(|look| look % step == 0 || look == &looks).collect()
+        let step = looks.div_ceil(250);
+        (1..=looks).filter(|look| look % step == 0 || look + 20 > looks).collect()
     };
     given_up_everywhere(&|| alone(&mesh), &tried);
 }
@@ -100,7 +93,7 @@ fn ranks_give_a_plan_up_at_the_same_look() {
             let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
             let ranks: Arc<dyn Communicator> = Arc::new(ranks);
             let tried = |looks: usize| {
-                let step = looks.div_ceil(1);
+                let step = looks.div_ceil(16);
                 (1..=looks).filter(|look| look % step == 0 || *look == looks).collect()
             };
             given_up_everywhere(&|| of_part(&ranks, &part), &tried);
