@@ -9,7 +9,7 @@ use std::{
 };
 
 use tombolo::{
-    Channel, FieldView, Settings, Step,
+    Adaptor, Channel, FieldView, Settings, Step,
     communicator::{Alarm, Communicator, Counted, Reduction, threads},
     deform::{
         distributed::{Part, PartBoundary, domain},
@@ -170,6 +170,56 @@ fn as_rank() {
     assert_eq!(none.err(), Some(MpiError::Null));
     partitioned(Mpi::new(&universe.world()).unwrap());
     changed_pipelines(Arc::new(Mpi::new(&universe.world()).unwrap()));
+    stopped_while_planning(Arc::new(Mpi::new(&universe.world()).unwrap()));
+}
+
+/// A stop ends the call in which several ranks find the shapes of an order that takes them long: on
+/// all of them, and nothing has moved.
+fn stopped_while_planning(ranks: Arc<dyn Communicator>) {
+    /// Far more than a set-up takes, and far less than all shapes.
+    const BOUND: Duration = Duration::from_secs(15);
+    let (rank, size) = (ranks.rank(), ranks.size());
+    if !(2..=3).contains(&size) {
+        return;
+    }
+    let mesh = box_of_tets([20, 20, 40], [0.0; 3], [1.0, 1.0, 2.0]);
+    let of_cells: Vec<usize> =
+        (0..mesh.cells().len()).map(|cell| cell * size / mesh.cells().len()).collect();
+    let part = Part::cut(&mesh, &of_cells, rank, true).unwrap();
+    let config = r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "stages": [
+        {"guard": {"min_scaled_jacobian": 0.05, "otherwise": "untangle", "surface": "allow"}}]}]}"#;
+    let orders = r#"[{"at": {"cycle": 1}, "order": {"edits": [{"rotate": {
+        "features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}}]}}]"#;
+    let settings = Settings {
+        config: parse(config, "test.json").unwrap(),
+        orders: parse_orders(orders, "orders.json").unwrap(),
+        ..Settings::default()
+    };
+    let mut adaptor = settings.on(Arc::clone(&ranks)).start().unwrap();
+    let execute = |adaptor: &mut Adaptor, cycle: u64| {
+        let step = Step { cycle, time: 0.1 * cycle as f64, time_step: 0.1 };
+        let steering = adaptor.execute(&step, &[Channel::new("fluid", part.view(), &[])]).unwrap();
+        (steering.motion.is_some(), steering.stop)
+    };
+    assert_eq!(execute(&mut adaptor, 0), (false, false));
+    let (stopper, begun) = (adaptor.stopper(), Instant::now());
+    let stopping = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(3));
+        if rank == 0 {
+            stopper.stop();
+        }
+    });
+    assert!(!execute(&mut adaptor, 1).0, "its shapes were found before the stop");
+    let took = begun.elapsed();
+    assert!(took >= Duration::from_secs(2), "they were found in {took:?}");
+    assert!(took < BOUND, "rank {rank} of {size} went on for {took:?}");
+    stopping.join().unwrap();
+    assert_eq!(execute(&mut adaptor, 2), (false, true));
+    let report = adaptor.finalize().unwrap();
+    if rank == 0 {
+        let reason = report.orders[0].reason.as_deref().unwrap();
+        assert!(reason.contains("the run ended"), "{reason}");
+    }
 }
 
 /// Every call, against what threads make of it.

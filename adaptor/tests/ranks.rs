@@ -554,3 +554,65 @@ fn an_order_that_waits_too_long_for_the_solver_is_rejected_on_all_ranks() {
     });
     assert_eq!(moved, [false; RANKS]);
 }
+
+/// Shapes that all ranks find together are given up, on all of them, where a viewer takes their
+/// order back; the next one is carried out.
+#[test]
+fn an_order_is_cancelled_while_all_ranks_find_its_shapes() {
+    let mesh = box_of_tets([24, 24, 24], [0.0; 3], [1.0; 3]);
+    let outcomes = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let settings = Settings {
+            config: config(LINK_TO_ALL),
+            communicator: Arc::new(ranks),
+            ..Settings::default()
+        };
+        let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+        let speed = speed(&part);
+        let fields = [FieldView::vertex("speed", &speed)];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+        let mut cancelling = None;
+        let mut moved = Vec::new();
+        let mut cycle = 0;
+        loop {
+            let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
+            moved.extend(steering.motion.map(|motion| motion.order.clone()));
+            if steering.stop {
+                break;
+            }
+            if rank == 0 && cycle == 0 {
+                let mut viewer = Viewer::connect(&adaptor);
+                viewer.hello();
+                cancelling = Some(std::thread::spawn(move || {
+                    let mut long = squeeze(0.3);
+                    long["schedule"] = json!({"steps": 10_000});
+                    viewer.send(&json!({"id": "long", "order": long}));
+                    let is = |id: &'static str, status: &'static str| {
+                        move |order: &serde_json::Value| {
+                            order["id"] == id && order["status"] == status
+                        }
+                    };
+                    viewer.wait_for("order", is("long", "computing"));
+                    viewer.send(&json!({"id": "c", "cancel": {"order": "long"}}));
+                    let told = viewer.wait_for("order", is("long", "rejected"));
+                    viewer.send(&json!({"id": "short", "order": squeeze(0.1)}));
+                    viewer.wait_for("order", is("short", "applied"));
+                    viewer.send(&json!({"id": "end", "stop": {}}));
+                    told["reason"].as_str().map(str::to_owned)
+                }));
+            }
+            std::thread::sleep(Duration::from_millis(2));
+            cycle += 1;
+            assert!(cycle < 100_000, "nobody stopped the run");
+        }
+        adaptor.finalize().expect("finalize");
+        let reason = cancelling.map(|thread| thread.join().expect("the viewer"));
+        (cycle, moved, reason)
+    });
+    assert_eq!(outcomes[0].2, Some(Some("cancelled by c1".into())));
+    for (cycle, moved, _) in &outcomes {
+        assert_eq!((cycle, moved), (&outcomes[0].0, &outcomes[0].1));
+        assert!(!moved.is_empty() && moved.iter().all(|order| order == "short"), "{moved:?}");
+    }
+}

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tombolo::deform::bounds::Bounds;
+use tombolo::deform::cancellation::Cancellation;
 use tombolo::deform::features::FeatureSettings;
 use tombolo::deform::linear::BuiltIn;
 use tombolo::deform::mesh::{Cells, Domain, FeatureSource, Mesh, Vector};
@@ -163,7 +164,9 @@ fn row(name: &'static str, mesh: &Mesh, warp: Warp) -> Result<Row, Box<dyn Error
     let boundary = surface.vertices();
     let (domain, start) = (Domain::from(mesh), Arc::<[Vector]>::from(mesh.points()));
     let guard = Guard { min_scaled_jacobian: 0.0, ..Guard::default() };
-    let volume = Volume { domain: &domain, boundary, solvers: &BuiltIn, operator: None };
+    let (solvers, wanted) = (&BuiltIn, Cancellation::default());
+    let volume =
+        Volume { domain: &domain, boundary, solvers, operator: None, cancellation: &wanted };
     let mut motion = Warped { points: mesh.points(), boundary, warp };
     let now = Instant::now();
     let untangler = || Arc::new(Untangler::new(mesh, boundary));

@@ -4,6 +4,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Instant;
 
+use tombolo_deform::cancellation::Cancellation;
 use tombolo_deform::linear::BuiltIn;
 use tombolo_deform::mesh::Domain;
 use tombolo_deform::mesh::{Mesh, Vector};
@@ -56,7 +57,14 @@ fn followed_if(mesh: &Mesh, warp: Warp, guard: &Guard, free: bool) -> Result<Rou
     let start: Arc<[Vector]> = mesh.points().into();
     let untangler = Arc::new(Untangler::new(mesh, &boundary));
     let untangler = || Arc::clone(&untangler);
-    let volume = Volume { domain: &domain, boundary: &boundary, solvers: &BuiltIn, operator: None };
+    let wanted = Cancellation::default();
+    let volume = Volume {
+        domain: &domain,
+        boundary: &boundary,
+        solvers: &BuiltIn,
+        operator: None,
+        cancellation: &wanted,
+    };
     let mut motion = Warped { mesh, boundary: &boundary, warp, free };
     let result = follow(volume, &start, &mut motion, &Deform::default(), guard, Some(&untangler));
     let result = result.map_err(|error| match error {

@@ -19,7 +19,7 @@ use crate::{
     changes::{Changes, make_absolute},
     lock::lock,
     meeting,
-    steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source},
+    steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source, taken_back},
     step::Moment,
     stream::{CommandSink, Hub},
 };
@@ -454,9 +454,13 @@ impl CommandSink for Intake {
         self.log.accept_from(client, id, &command, moment, move |taken| {
             if let Some(tell) = taken {
                 let stops = matches!(received.command, Command::Stop {});
+                let order = taken_back(&received.command).map(str::to_owned);
                 queue.push_and_tell(received, tell);
-                if stops {
-                    forecaster.get().into_iter().for_each(Forecaster::give_up);
+                if let Some(forecaster) = forecaster.get() {
+                    if stops {
+                        forecaster.give_up();
+                    }
+                    order.iter().for_each(|order| forecaster.take_back(order));
                 }
             }
         });

@@ -23,8 +23,8 @@ impl Stopper {
     /// Asks the run to stop, as a viewer's `stop` does: the next call of `execute` says so to the
     /// solver on all ranks, and one that is paused, or waits for a viewer, goes on. Returns at once.
     ///
-    /// On one process shapes that are being found are given up. Several ranks find them together,
-    /// inside of `execute`, and give nothing up: there the stop takes effect behind them.
+    /// Shapes that are being found are given up. Several ranks find them together, inside of
+    /// `execute`: they give them up behind their next reduction, and that call returns.
     ///
     /// It counts on rank 0. It takes locks, so that it must not be called inside of a signal's
     /// handler; a thread that waits for signals may call it.

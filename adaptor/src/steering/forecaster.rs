@@ -3,12 +3,13 @@
 use std::sync::{Arc, Mutex};
 
 use tombolo_deform::mesh::Vector;
-use tombolo_deform::shape::{CurrentShape, Forecast};
+use tombolo_deform::shape::{CurrentShape, Forecast, ShapeSeconds};
 use tombolo_pipelines::language::Order;
 
 use super::{
     Defaults, EditStack,
     planner::{PlanRequest, Rejection},
+    together::PlanTogether,
     worker::Jobs,
 };
 use crate::lock::lock;
@@ -25,16 +26,35 @@ pub(super) struct Present {
 }
 
 /// Asks the worker without going through the solver's thread, so that an answer does not wait for
-/// the end of a step.
+/// the end of a step, and has shapes given up.
 pub(crate) struct Forecaster {
     pub(super) present: Arc<Mutex<Present>>,
-    pub(super) jobs: Arc<Jobs>,
+    pub(super) planning: Planning,
+}
+
+/// Where shapes are found.
+pub(super) enum Planning {
+    /// On a thread of its own.
+    Beside(Arc<Jobs>),
+    /// On all ranks together, inside of a call.
+    Together(Arc<PlanTogether>),
 }
 
 impl Forecaster {
     /// Gives up all shapes that are being found, and those that will be asked for: the run is to end.
     pub(crate) fn give_up(&self) {
-        self.jobs.give_up();
+        match &self.planning {
+            Planning::Beside(jobs) => jobs.give_up(),
+            Planning::Together(planned) => planned.give_up(),
+        }
+    }
+
+    /// Has the ranks give up the shapes of an order that a command in the queue takes back: none of
+    /// them can obey it before. On one process the next call obeys it while they are found.
+    pub(crate) fn take_back(&self, order: &str) {
+        if let Planning::Together(planned) = &self.planning {
+            planned.take_back(order);
+        }
     }
 
     /// Has `answer` called with what `order` would come to, were it given now. What the same
@@ -45,10 +65,14 @@ impl Forecaster {
         order: &Order,
         answer: impl FnOnce(Forecast) + Send + 'static,
     ) {
+        let Planning::Beside(jobs) = &self.planning else {
+            let reason = "only all ranks together can tell, at a safe point";
+            return answer(Forecast::rejected(reason.into(), None, None, ShapeSeconds::default()));
+        };
         let Present { defaults, stack, here, own } = lock(&self.present).clone();
         match defaults.request(&stack, here, order) {
             Ok((_, request)) => {
-                self.jobs.forecast(asker, PlanRequest { request, own }, Box::new(answer))
+                jobs.forecast(asker, PlanRequest { request, own }, Box::new(answer))
             }
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);

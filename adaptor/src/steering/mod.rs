@@ -7,6 +7,9 @@
 //! the earlier order's edits too (or not, if the new order takes it back). If the new order is
 //! refused, the schedule under way goes on as if nothing had been asked.
 //!
+//! Several ranks plan together, inside of a call, and give up together what is cancelled meanwhile
+//! (`together`).
+//!
 //! Orders of viewers are planned on a thread of their own while the solver keeps stepping, and a
 //! schedule under way goes on meanwhile. Where the mesh has moved since, the way from its present
 //! shape is judged again before the first shape is handed out, and the mesh rests meanwhile. The
@@ -28,6 +31,7 @@ mod source;
 mod stack;
 mod steerer;
 mod timed;
+mod together;
 mod worker;
 
 use std::{sync::LazyLock, time::Instant};
@@ -48,6 +52,7 @@ pub(crate) use source::Source;
 pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::Timed;
+pub(crate) use together::taken_back;
 
 /// Seconds since the first call of this function: the clock of a
 /// [`Shaper`](tombolo_deform::shape::Shaper).

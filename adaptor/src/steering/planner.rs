@@ -5,7 +5,7 @@ use std::{collections::VecDeque, sync::Arc};
 use tombolo_deform::shape::{Forecast, Judged, Plan, Refused, Request, ShapeSeconds, Shaper};
 use tombolo_deform::{
     mesh::Vector,
-    quality::{Guard, Otherwise, judge},
+    quality::{Guard, Otherwise, judge_unless},
 };
 use tombolo_pipelines::language::Deformation;
 
@@ -141,8 +141,9 @@ impl Planner {
             shape.iter().zip(own).map(sum).collect()
         };
         for ends in plan.way().windows(2) {
-            let judged =
-                judge(self.shaper.domain(), &moved(&ends[0]), &moved(&ends[1]), &[1.0], guard);
+            let (start, end) = (moved(&ends[0]), moved(&ends[1]));
+            let (domain, cancellation) = (self.shaper.domain(), self.shaper.cancellation());
+            let judged = judge_unless(domain, &start, &end, &[1.0], guard, cancellation);
             if let Err(refusal) = judged {
                 let refused = Refused::from(refusal);
                 return Err(Rejection::of(

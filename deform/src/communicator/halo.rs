@@ -170,6 +170,11 @@ impl Halo {
         self.shared.last().map_or(0, |&last| last as usize + 1)
     }
 
+    /// The halo with another way to speak to the same ranks.
+    pub(crate) fn among(&self, communicator: Arc<dyn Communicator>) -> Self {
+        Self { communicator, ..self.clone() }
+    }
+
     /// The ranks that list the entries.
     #[must_use]
     pub fn communicator(&self) -> &Arc<dyn Communicator> {

@@ -2,9 +2,10 @@
 //!
 //! A [`Communicator`] is one process ([`Solo`]), the ranks of an MPI communicator, or a number of
 //! [`threads`] of one process; [`Counted`] counts what goes through one. [`agree`] is the way in
-//! which ranks fail together. A [`Halo`] knows which entries of a list other ranks list too.
+//! which ranks fail together, [`Cancelling`] that in which they give up together. A [`Halo`] knows which entries of a list other ranks list too.
 
 mod alarm;
+mod cancelling;
 mod counted;
 mod halo;
 mod message;
@@ -12,6 +13,7 @@ pub mod threads;
 mod tree;
 
 pub use alarm::Alarm;
+pub use cancelling::Cancelling;
 pub use counted::{Counted, Traffic};
 
 pub use halo::{Halo, Neighbour, Value};

@@ -61,7 +61,7 @@ impl<const B: usize> ConjugateGradients<B> {
     }
 
     /// The solver with what has a solve given up, which is looked at before each iteration.
-    pub(super) fn with_cancellation(self, cancellation: Cancellation) -> Self {
+    pub(crate) fn with_cancellation(self, cancellation: Cancellation) -> Self {
         Self { cancellation, ..self }
     }
 

@@ -58,38 +58,40 @@ pub fn solver<const B: usize>(
     matrix: Arc<SparseMatrix<B>>,
     halo: &Halo,
 ) -> Result<Box<dyn LinearSolver<B>>, LinearError> {
-    if halo.communicator().size() > 1 {
-        // Sweeps know less of the other ranks' rows, and more of them are needed before multigrid
-        // has stalled.
-        let settings = MultigridSettings { max_iterations: 300, ..MultigridSettings::default() };
-        return Ok(Box::new(Multigrid::distributed(halo.clone(), matrix, settings)?));
-    }
-    if B * matrix.rows() <= DIRECT
-        && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
-    {
-        return Ok(Box::new(direct));
-    }
-    Ok(Box::new(Multigrid::new(matrix, of_one_process())?))
+    Cancellable::default().solver(matrix, halo)
 }
 
 fn of_one_process() -> MultigridSettings {
     MultigridSettings { by_half: true, ..MultigridSettings::default() }
 }
 
-/// The kernel's own solvers of one process, which are given up where that is asked for: it is
-/// looked at before each set-up and each iteration.
+/// The kernel's own solvers, which are given up where that is asked for: it is looked at before each
+/// set-up and each iteration. Of several ranks all have to see the same at each look, as they do with
+/// [`Cancelling`](crate::communicator::Cancelling).
 #[derive(Debug, Clone, Default)]
 pub struct Cancellable(pub Cancellation);
 
 impl Cancellable {
     fn solver<const B: usize>(&self, matrix: Arc<SparseMatrix<B>>, halo: &Halo) -> Solver<B> {
-        if halo.communicator().size() > 1 || B * matrix.rows() <= DIRECT {
-            return solver(matrix, halo);
+        let is_alone = halo.communicator().size() == 1;
+        if is_alone
+            && B * matrix.rows() <= DIRECT
+            && let Ok(direct) = Cholesky::new(Arc::clone(&matrix))
+        {
+            return Ok(Box::new(direct));
         }
         if self.0.is_cancelled() {
             return Err(LinearError::Cancelled);
         }
-        let multigrid = Multigrid::new(matrix, of_one_process())?;
+        let multigrid = if is_alone {
+            Multigrid::new(matrix, of_one_process())?
+        } else {
+            // Sweeps know less of the other ranks' rows, and more of them are needed before
+            // multigrid has stalled.
+            let settings =
+                MultigridSettings { max_iterations: 300, ..MultigridSettings::default() };
+            Multigrid::distributed(halo.clone(), matrix, settings)?
+        };
         Ok(Box::new(multigrid.with_cancellation(self.0.clone())))
     }
 }
@@ -132,6 +134,13 @@ pub trait Solvers: std::fmt::Debug + Send + Sync {
     fn are_wanted(&self) -> bool {
         true
     }
+
+    /// The same choice of solvers that are given up where that is asked for; `None` where solves
+    /// are finished first.
+    fn unless(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
+        let _ = cancellation;
+        None
+    }
 }
 
 /// A solver, or why there is none.
@@ -148,6 +157,10 @@ impl Solvers for BuiltIn {
 
     fn vector(&self, matrix: Arc<SparseMatrix<3>>, halo: &Halo, _: &[Vector]) -> Solver<3> {
         solver(matrix, halo)
+    }
+
+    fn unless(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
+        Some(Arc::new(Cancellable(cancellation.clone())))
     }
 }
 

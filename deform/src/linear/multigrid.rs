@@ -278,7 +278,7 @@ impl<const B: usize> Multigrid<B> {
     }
 
     /// The solver with what has a solve given up, which is looked at before each iteration.
-    pub(super) fn with_cancellation(self, cancellation: Cancellation) -> Self {
+    pub(crate) fn with_cancellation(self, cancellation: Cancellation) -> Self {
         let of_own = |own: ConjugateGradients<B>| own.with_cancellation(cancellation.clone());
         let fallback = self
             .fallback

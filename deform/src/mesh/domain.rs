@@ -66,6 +66,11 @@ impl Domain {
         Self { mesh, halo: self.halo.clone(), part: self.part.clone() }
     }
 
+    /// The part with another way to speak to the same ranks.
+    pub(crate) fn among(&self, communicator: Arc<dyn Communicator>) -> Self {
+        Self { halo: self.halo.among(communicator), ..self.clone() }
+    }
+
     /// The ranks.
     #[must_use]
     pub fn communicator(&self) -> &Arc<dyn Communicator> {

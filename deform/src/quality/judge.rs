@@ -18,6 +18,10 @@ use crate::mesh::{Domain, Mesh, Vector};
 use crate::number::real;
 use crate::parallel;
 
+/// Shapes of cells that are looked at between two places where it can be given up: on several ranks
+/// these must meet to know.
+const TOGETHER: usize = 1 << 26;
+
 /// The quality along a path that the guard lets through.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PathQuality {
@@ -85,8 +89,9 @@ pub fn judge(
     judge_unless(domain, start, end, fractions, guard, &Cancellation::default())
 }
 
-/// Judges a straight path as [`judge`] does, unless another thread has it given up. On several
-/// ranks all of them have to, or none.
+/// Judges a straight path as [`judge`] does, unless another thread has it given up, which is looked
+/// at for each few thousand cells, and so in the search for the feasible fraction. On several ranks
+/// all have to see the same: see [`Cancelling`](crate::communicator::Cancelling).
 ///
 /// # Errors
 /// [`Refusal::Cancelled`]; those of [`judge`].
@@ -105,17 +110,36 @@ pub fn judge_unless(
         arguments?;
         return Err(Refusal::OtherRank);
     }
-    let (path, floor) = Path::new(&domain, start, end, guard);
-    let look = |range| (!cancellation.is_cancelled()).then(|| path.look(range, fractions));
+    let (path, floor) = Path::new(&domain, start, end, guard, cancellation);
+    // Here too: a rank without cells has no chunk to look before.
+    path.require_wanted()?;
+    let look = |range: std::ops::Range<usize>| {
+        (!cancellation.is_cancelled()).then(|| path.look(range, fractions))
+    };
     let mut total = Part::new(fractions.len());
-    for part in parallel::map_chunks(mesh.cells().len(), CHUNK, look) {
-        total.merge(part.ok_or(Refusal::Cancelled)?);
+    let (cells, is_alone) = (mesh.cells().len(), domain.communicator().size() == 1);
+    let groups = path.most_cells.saturating_mul(fractions.len()).div_ceil(TOGETHER).max(1);
+    let group = cells.div_ceil(CHUNK).div_ceil(groups) * CHUNK;
+    for index in 0..groups {
+        if index > 0 && !is_alone {
+            domain.communicator().all(true);
+            path.require_wanted()?;
+        }
+        let (from, to) = ((index * group).min(cells), ((index + 1) * group).min(cells));
+        let parts = parallel::map_chunks(to - from, CHUNK, |range| {
+            look(from + range.start..from + range.end)
+        });
+        for part in parts {
+            total.merge(part.ok_or(Refusal::Cancelled)?);
+        }
     }
     if domain.communicator().size() > 1 {
         total = total.gathered(&**domain.communicator());
     }
     if total.failing > 0 {
-        return Err(Refusal::Quality(Box::new(path.broken(total, floor))));
+        let broken = path.broken(total, floor);
+        path.require_wanted()?;
+        return Err(Refusal::Quality(Box::new(broken)));
     }
     let count = real(total.cells.max(1));
     let value = |sum: f64| if total.cells == 0 { 1.0 } else { sum };
@@ -135,13 +159,26 @@ pub fn judge_unless(
 /// Whether [`judge`] would let a straight step through, without saying why not. Collective.
 #[must_use]
 pub fn keeps(domain: impl Into<Domain>, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
+    keeps_unless(domain, start, end, guard, &Cancellation::default())
+}
+
+/// [`keeps`], unless another thread has it given up: then it is said not to. Collective, as
+/// [`judge_unless`].
+#[must_use]
+pub fn keeps_unless(
+    domain: impl Into<Domain>,
+    start: &[Vector],
+    end: &[Vector],
+    guard: &Guard,
+    cancellation: &Cancellation,
+) -> bool {
     let domain = domain.into();
     if !domain.communicator().all(check_arguments(domain.mesh(), start, end, &[1.0], guard).is_ok())
     {
         return false;
     }
-    let path = Path::new(&domain, start, end, guard).0;
-    !path.fails(1.0)
+    let path = Path::new(&domain, start, end, guard, cancellation).0;
+    path.require_wanted().is_ok() && !path.fails(1.0)
 }
 
 fn check_arguments(
@@ -220,6 +257,9 @@ struct Path<'a> {
     /// With the slack taken off.
     floor: f64,
     domain: &'a Domain,
+    cancellation: &'a Cancellation,
+    /// The cells of the rank that has most of them.
+    most_cells: usize,
 }
 
 /// The findings in some of the cells.
@@ -335,13 +375,27 @@ impl<'a> Path<'a> {
         start: &'a [Vector],
         end: &'a [Vector],
         guard: &Guard,
+        cancellation: &'a Cancellation,
     ) -> (Self, f64) {
         let mesh = domain.mesh();
         let measure = Measure::new(mesh.cells());
-        let mut least = [least_scaled_jacobian(&measure, mesh.points())];
+        let cells = mesh.cells().len();
+        let mut least = [least_scaled_jacobian(&measure, mesh.points()), -real(cells)];
         domain.communicator().reduce(Reduction::Minimum, &mut least);
-        let floor = guard.min_scaled_jacobian.min(least[0]);
-        (Self { measure, start, end, floor: floor - 1e-9 * floor.abs(), domain }, floor)
+        let [least, fewest] = least;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a count of cells"
+        )]
+        let most_cells = -fewest as usize;
+        let floor = guard.min_scaled_jacobian.min(least);
+        let with_slack = floor - 1e-9 * floor.abs();
+        (Self { measure, start, end, floor: with_slack, domain, cancellation, most_cells }, floor)
+    }
+
+    fn require_wanted(&self) -> Result<(), Refusal> {
+        if self.cancellation.is_cancelled() { Err(Refusal::Cancelled) } else { Ok(()) }
     }
 
     /// Looks at each cell of a range at all shapes, at four tetrahedra at a time.
@@ -448,11 +502,15 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// By bisection of "every cell is valid up to here and above the floor here", to 2⁻²⁰.
+    /// By bisection of "every cell is valid up to here and above the floor here", to 2⁻²⁰; coarser
+    /// where it is given up.
     fn feasible_fraction(&self) -> f64 {
         if self.fails(1.0) {
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..20 {
+                if self.require_wanted().is_err() {
+                    break;
+                }
                 let middle = 0.5 * (low + high);
                 if self.fails(middle) { high = middle } else { low = middle }
             }
@@ -462,8 +520,12 @@ impl<'a> Path<'a> {
         }
     }
 
+    /// Whether a cell is broken at a fraction of the way or before it; also where it is given up.
     fn fails(&self, fraction: f64) -> bool {
         let fails = parallel::any_chunk(self.measure.cells.len(), CHUNK, |range| {
+            if self.cancellation.is_cancelled() {
+                return true;
+            }
             with_wide_registers(
                 #[inline(always)]
                 || {

@@ -28,7 +28,7 @@ pub use change::{Change, Spread, change, volumes};
 pub use fold::turns_over;
 pub use guard::{Guard, Otherwise, SurfaceRule};
 pub(crate) use judge::check_ends;
-pub use judge::{PathQuality, ShapeQuality, judge, judge_unless, keeps, shape_at};
+pub use judge::{PathQuality, ShapeQuality, judge, judge_unless, keeps, keeps_unless, shape_at};
 pub use refusal::{BrokenPath, FailingCell, Refusal};
 
 use crate::communicator::{Garbled, Reader, Writer};

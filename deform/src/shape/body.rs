@@ -9,7 +9,7 @@ use crate::communicator::{Communicator, Reduction, first_failure};
 use crate::distributed::PartBoundary;
 use crate::linear::Solvers;
 use crate::mesh::{Domain, Vector};
-use crate::quality::{Guard, PathQuality, Refusal, SurfaceRule, judge_unless, keeps};
+use crate::quality::{Guard, PathQuality, Refusal, SurfaceRule, judge_unless, keeps_unless};
 use crate::surface::{Surface, require_sound};
 
 /// A body: its domain, its boundary, and the choice of solvers for its volume. All that spans ranks
@@ -47,13 +47,20 @@ impl Body {
         judge_unless(&self.domain, start, end, fractions, guard, &self.cancellation)
     }
 
-    /// Refuses to go on with what was given up. Of several ranks none gives anything up.
+    /// Refuses to go on with what was given up: all ranks come here, and all or none are refused.
     pub(super) fn require_wanted(&self) -> Result<(), Refused> {
         if self.cancellation.is_cancelled() { Err(Refused::Cancelled) } else { Ok(()) }
     }
 
+    /// The outcome, unless it was given up meanwhile: what was found then may be less than there is.
+    pub(super) fn unless_given_up<T>(&self, found: Result<T, Refused>) -> Result<T, Refused> {
+        self.require_wanted()?;
+        found
+    }
+
+    /// Whether the guard lets a straight step through; not where it was given up.
     pub(super) fn keeps(&self, start: &[Vector], end: &[Vector], guard: &Guard) -> bool {
-        keeps(&self.domain, start, end, guard)
+        keeps_unless(&self.domain, start, end, guard, &self.cancellation)
     }
 
     /// The coordinates of the boundary's vertices where those of the mesh lie at `points`.

@@ -161,6 +161,11 @@ impl Shaper {
     /// [`Refused`], with what was reached, where it broke, and what fraction would pass.
     pub fn plan(&mut self, request: &Request) -> Result<Plan, Refused> {
         self.spent = ShapeSeconds::default();
+        let plan = self.way_to(request);
+        self.body.unless_given_up(plan)
+    }
+
+    fn way_to(&mut self, request: &Request) -> Result<Plan, Refused> {
         let Request { stack, start, deformation, schedule, guard, .. } = request;
         check_stack(&**stack)?;
         schedule.check()?;
@@ -203,7 +208,8 @@ impl Shaper {
             return Ok(plan?.finished(&self.body, seconds));
         }
         // Of several ranks all say the same, each with its own cells' numbers in it.
-        let plan = self.body.agree(travel(&self.body, start, target, schedule, guard));
+        let plan = self.body.unless_given_up(travel(&self.body, start, target, schedule, guard));
+        let plan = self.body.agree(plan);
         let spent = watch.seconds();
         self.spent.guard += spent;
         let seconds = ShapeSeconds { guard: target.seconds.guard + spent, ..target.seconds };
@@ -286,7 +292,10 @@ impl Shaper {
         let carrier = deform.lets_go().then_some(set_up);
         let known = self.untangler.clone().map_or_else(OnceCell::new, OnceCell::from);
         let untangler = || {
-            let made = || Arc::new(Untangler::new(&body.domain, body.vertices()));
+            let made = || {
+                let untangler = Untangler::new(&body.domain, body.vertices());
+                Arc::new(untangler.with_cancellation(body.cancellation.clone()))
+            };
             Arc::clone(known.get_or_init(made))
         };
         let ground = displacement(self.editor.as_mut(), &body, below, carrier.as_deref())?;
@@ -308,6 +317,7 @@ impl Shaper {
             boundary: body.vertices(),
             solvers: &*body.solvers,
             operator: operator.as_ref(),
+            cancellation: &body.cancellation,
         };
         let mut route =
             follow(volume, &base.points, &mut motion, &deform.equation, guard, Some(&untangler));

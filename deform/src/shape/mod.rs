@@ -12,6 +12,8 @@ mod saved;
 mod surface_only;
 // Ranks are threads, which WebAssembly does not have.
 #[cfg(all(test, not(target_family = "wasm")))]
+mod cancelled;
+#[cfg(all(test, not(target_family = "wasm")))]
 mod tests;
 
 use std::sync::Arc;
@@ -19,11 +21,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::cancellation::Cancellation;
-use crate::communicator::{Communicator, agree};
+use crate::communicator::{Cancelling, Communicator, agree};
 use crate::distributed::{DistributedError, PartBoundary};
 use crate::edit::{Edit, EditError, Editor};
 use crate::limits::{EDITS, Exceeded, LISTED};
-use crate::linear::{BuiltIn, Cancellable, Solvers};
+use crate::linear::{Cancellable, Solvers};
 use crate::mesh::{Domain, Mesh, Vector};
 use crate::quality::{Guard, SurfaceRule};
 use crate::surface::{Surface, require_sound};
@@ -205,14 +207,16 @@ impl Shaper {
         let ranks = domain.communicator();
         let editor = if ranks.size() == 1 { editor? } else { agree(&**ranks, editor)? };
         let reference = Arc::clone(domain.mesh().shared_points());
-        let cancellation = Cancellation::default();
-        let is_alone = ranks.size() == 1;
-        let (editor, solvers): (_, Arc<dyn Solvers>) = if is_alone {
-            let editor = editor.map(|editor| editor.with_cancellation(cancellation.clone()));
-            (editor, Arc::new(Cancellable(cancellation.clone())))
+        let (domain, cancellation) = if ranks.size() == 1 {
+            (domain, Cancellation::default())
         } else {
-            (editor, Arc::new(BuiltIn))
+            let cancellation = Cancellation::of_ranks();
+            let ranks = Cancelling::new(Arc::clone(ranks), cancellation.clone());
+            (domain.among(Arc::new(ranks)), cancellation)
         };
+        // The surface is on one rank, which edits it alone.
+        let editor = editor.map(|editor| editor.with_cancellation(cancellation.of_this_rank()));
+        let solvers = Arc::new(Cancellable(cancellation.clone()));
         Ok(Self {
             body: Arc::new(Body { domain, boundary, solvers, cancellation }),
             editor,
@@ -231,6 +235,7 @@ impl Shaper {
     #[must_use]
     pub fn with_solvers(self, solvers: Arc<dyn Solvers>) -> Self {
         let Body { domain, boundary, cancellation, .. } = &*self.body;
+        let solvers = solvers.unless(cancellation).unwrap_or(solvers);
         let body = Body {
             domain: domain.clone(),
             boundary: boundary.clone(),
@@ -255,10 +260,13 @@ impl Shaper {
     }
 
     /// By which another thread has a plan under way given up: it is refused with
-    /// [`Refused::Cancelled`] at the next look, in the set-up, the iterations of a solve and the
-    /// checks, and so are those that follow until [`Cancellation::renew`]; with
-    /// [other solvers](Self::with_solvers) their set-up and solves are finished first. Of one process
-    /// alone: of several ranks each would have to be told in the same moment.
+    /// [`Refused::Cancelled`] at the next look, in the set-up, the iterations of a solve or of an
+    /// untangling, and the checks, and so are those that follow until [`Cancellation::renew`]; with
+    /// solvers [other](Self::with_solvers) than the kernel's a set-up and a solve of theirs are
+    /// finished first.
+    ///
+    /// Of several ranks any may ask. All of them are refused, at the same place, behind the next
+    /// reduction: see [`Cancelling`]. Before the next plan all renew.
     #[must_use]
     pub fn cancellation(&self) -> &Cancellation {
         &self.body.cancellation
@@ -418,7 +426,9 @@ impl Shaper {
             self.spent.surface += watch.seconds();
             sound?;
         }
-        Ok(Target { iterations, ..Target::new(points, &reference, seconds) })
+        let target = Target { iterations, ..Target::new(points, &reference, seconds) };
+        // What it was improved by, or not, may be due to that.
+        self.body.unless_given_up(Ok(target))
     }
 
     /// The shape with its worst cells lifted, where that could be done.
@@ -427,9 +437,10 @@ impl Shaper {
             return None;
         }
         let body = &self.body;
-        let improver = self
-            .improver
-            .get_or_insert_with(|| Arc::new(Improver::new(&body.domain, body.vertices())));
+        let improver = self.improver.get_or_insert_with(|| {
+            let improver = Improver::new(&body.domain, body.vertices());
+            Arc::new(improver.with_cancellation(body.cancellation.clone()))
+        });
         let mut points = points.to_vec();
         if !improver.improve(&mut points, deform.equation.improve) {
             return None;

@@ -126,6 +126,7 @@ impl Refused {
             | Refused::Guard(Refusal::Cancelled)
             | Refused::Edit(EditError::Cancelled) => true,
             Refused::Volume(error) => error.is_cancelled(),
+            Refused::Elsewhere(elsewhere) => elsewhere.is_cancelled,
             _ => false,
         }
     }
@@ -204,6 +205,7 @@ pub struct Elsewhere {
     pub(super) is_surface: bool,
     pub(super) is_quality: bool,
     pub(super) breaks_down: bool,
+    pub(super) is_cancelled: bool,
     pub(super) feasible_fraction: Option<f64>,
     pub(super) min_scaled_jacobian: Option<f64>,
     pub(super) place: Option<Vector>,
@@ -224,6 +226,7 @@ impl Elsewhere {
             is_surface: refused.is_surface(),
             is_quality: refused.is_quality(),
             breaks_down: refused.breaks_down(),
+            is_cancelled: refused.is_cancelled(),
             feasible_fraction: refused.feasible_fraction(),
             min_scaled_jacobian: refused.min_scaled_jacobian(),
             place: refused.place(),
@@ -233,7 +236,8 @@ impl Elsewhere {
     pub(super) fn into_bytes(self) -> Vec<u8> {
         let flags = u8::from(self.is_surface)
             + 2 * u8::from(self.is_quality)
-            + 4 * u8::from(self.breaks_down);
+            + 4 * u8::from(self.breaks_down)
+            + 8 * u8::from(self.is_cancelled);
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN).to_le_bytes();
         let mut bytes = vec![flags];
         bytes.extend(number(self.feasible_fraction));
@@ -260,6 +264,7 @@ impl Elsewhere {
             is_surface: flags & 1 != 0,
             is_quality: flags & 2 != 0,
             breaks_down: flags & 4 != 0,
+            is_cancelled: flags & 8 != 0,
             feasible_fraction: number(0),
             min_scaled_jacobian: number(1),
             place: number(2).zip(number(3)).zip(number(4)).map(|((x, y), z)| [x, y, z]),

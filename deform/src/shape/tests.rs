@@ -36,7 +36,7 @@ const DEALS: [Deal; 5] = [
     Deal { ranks: 4, empty: Some(0), ghosts: true, shuffle: 5, ..PLAIN },
 ];
 
-fn stack(edits: serde_json::Value) -> Vec<Edit> {
+pub(super) fn stack(edits: serde_json::Value) -> Vec<Edit> {
     serde_json::from_value(edits).unwrap()
 }
 
@@ -64,19 +64,19 @@ fn on_ranks<T: Send>(
 }
 
 /// A request from the reference on.
-fn asked(shaper: &Shaper, edits: &[Edit], deformation: &Deformation) -> Request {
+pub(super) fn asked(shaper: &Shaper, edits: &[Edit], deformation: &Deformation) -> Request {
     Request {
         deformation: deformation.clone(),
         ..Request::new(edits, Arc::clone(shaper.reference()))
     }
 }
 
-fn of_part(ranks: &Arc<dyn Communicator>, part: &Part) -> Shaper {
+pub(super) fn of_part(ranks: &Arc<dyn Communicator>, part: &Part) -> Shaper {
     let (domain, boundary) = domain(ranks, part, &FeatureSettings::default()).unwrap();
     Shaper::new(domain, boundary).unwrap()
 }
 
-fn alone(mesh: &Mesh) -> Shaper {
+pub(super) fn alone(mesh: &Mesh) -> Shaper {
     let mesh = Arc::new(mesh.clone());
     let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
     Shaper::new(mesh, surface).unwrap()

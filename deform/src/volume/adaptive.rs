@@ -12,7 +12,7 @@ use crate::communicator::Communicator;
 use crate::linear::LinearError;
 use crate::mesh::{Mesh, Vector};
 use crate::number::real;
-use crate::quality::{Guard, judge, keeps, quality};
+use crate::quality::{Guard, Refusal, judge_unless, keeps_unless, quality};
 use crate::vector::{add, scale, subtract};
 
 /// The first sub-step, what a sub-step that holds lets the next one grow by, and the least one
@@ -74,7 +74,8 @@ const TOLERANCE: f64 = 1e-5;
 ///
 /// # Errors
 /// [`FollowError`]; [`FollowError::Stalled`] with how far it came. A linear system that cannot be
-/// solved is a sub-step that does not hold.
+/// solved is a sub-step that does not hold. Where it is given up, [`FollowError::Volume`] with an
+/// error that [says so](VolumeError::is_cancelled).
 pub fn follow<M: BoundaryMotion>(
     volume: Volume<'_>,
     start: &Arc<[Vector]>,
@@ -108,6 +109,9 @@ pub fn follow<M: BoundaryMotion>(
             before => follower.operator(before.as_deref(), &stiffened, stiffening, &settings)?,
         };
         loop {
+            if volume.cancellation.is_cancelled() {
+                return Err(FollowError::Volume(LinearError::Cancelled.into()));
+            }
             // 2. A sub-step by one linear solve. A last one that would leave next to nothing takes
             //    it along.
             let next = if reached + 1.25 * step >= goal { goal } else { reached + step };
@@ -227,7 +231,7 @@ impl<M: BoundaryMotion> Follower<'_, M> {
     }
 
     fn keeps(&self, from: &[Vector], to: &[Vector]) -> bool {
-        keeps(self.volume.domain, from, to, self.guard)
+        keeps_unless(self.volume.domain, from, to, self.guard, self.volume.cancellation)
     }
 
     fn untangle(&self, points: &mut [Vector], from: Regularisation) -> bool {
@@ -403,7 +407,10 @@ impl<M: BoundaryMotion> Follower<'_, M> {
         impossible: Option<Impossible>,
         end_is_valid: bool,
     ) -> FollowError<M::Error> {
-        match judge(self.volume.domain, &self.here.points, candidate, &[1.0], self.guard) {
+        let Volume { domain, cancellation, .. } = self.volume;
+        let here = &self.here.points;
+        match judge_unless(domain, here, candidate, &[1.0], self.guard, cancellation) {
+            Err(Refusal::Cancelled) => FollowError::Volume(LinearError::Cancelled.into()),
             Err(refusal) => FollowError::Stalled(Box::new(Stalled {
                 route: self.route,
                 refusal,
@@ -468,11 +475,20 @@ mod tests {
     use std::convert::Infallible;
 
     use super::*;
+    use crate::cancellation::Cancellation;
     use crate::linear::BuiltIn;
     use crate::mesh::Domain;
     use crate::mesh::Mesh;
     use crate::quality::{Refusal, keeps, quality};
     use crate::shapes;
+
+    fn volume<'a>(
+        domain: &'a Domain,
+        boundary: &'a [u32],
+        cancellation: &'a Cancellation,
+    ) -> Volume<'a> {
+        Volume { domain, boundary, solvers: &BuiltIn, operator: None, cancellation }
+    }
 
     struct Places<F>(F);
 
@@ -519,9 +535,8 @@ mod tests {
             let start: Arc<[Vector]> = mesh.points().into();
             let untangler = Arc::new(Untangler::new(&mesh, &boundary));
             let untangler = || Arc::clone(&untangler);
-            let domain = Domain::from(&mesh);
-            let volume =
-                Volume { domain: &domain, boundary: &boundary, solvers: &BuiltIn, operator: None };
+            let (domain, wanted) = (Domain::from(&mesh), Cancellation::default());
+            let volume = volume(&domain, &boundary, &wanted);
             let mut motion = Places(|to| twisted(&mesh, &boundary, 180.0 * to));
             let route =
                 follow(volume, &start, &mut motion, &Deform::default(), &guard, Some(&untangler))
@@ -560,8 +575,8 @@ mod tests {
         let untangler = || Arc::clone(&untangler);
         let guard = Guard { min_scaled_jacobian: 0.05, ..Guard::default() };
         let domain = Domain::from(&mesh);
-        let volume =
-            Volume { domain: &domain, boundary: &boundary, solvers: &BuiltIn, operator: None };
+        let wanted = Cancellation::default();
+        let volume = volume(&domain, &boundary, &wanted);
         let result = follow(
             volume,
             &start,

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::corners::Corner;
 use super::foldover;
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Halo, Reduction};
 use crate::linear::{
-    ConjugateGradients, LinearError, Multigrid, MultigridSettings, Solver, SparseMatrix, Tolerance,
-    reverse_cuthill_mckee,
+    Cancellable, ConjugateGradients, LinearError, Multigrid, MultigridSettings, Solver, Solvers,
+    SparseMatrix, Tolerance, reverse_cuthill_mckee,
 };
 use crate::mesh::{Mesh, Numbering, Vector};
 use crate::parallel;
@@ -42,6 +43,8 @@ pub(super) struct Newton {
     offsets: Vec<usize>,
     columns: Vec<u32>,
     halo: Halo,
+    /// Looked at before each step, each length of one and each iteration of its solve.
+    pub(super) cancellation: Cancellation,
 }
 
 /// Springs that draw each unknown to a position: the energy `½ weight |x - position|²`.
@@ -106,7 +109,8 @@ impl Newton {
         let unknowns: Vec<u32> = order.iter().map(|&old| vertices[old as usize]).collect();
         let slots = indices(free.len(), &unknowns);
         let vertices: Vec<u32> = unknowns.iter().map(|&index| numbering.vertex(index)).collect();
-        Self { unknowns, slots, offsets, columns, halo: of_mesh.of(&vertices) }
+        let (halo, cancellation) = (of_mesh.of(&vertices), Cancellation::default());
+        Self { unknowns, slots, offsets, columns, halo, cancellation }
     }
 
     /// How many vertices the mesh has.
@@ -150,18 +154,24 @@ impl Newton {
     }
 
     /// Goes a step of Newton's method down, over `allowed` shapes alone; `None` where there is
-    /// none, and `points` are then as they were.
+    /// none or it is given up, and `points` are then as they were.
     pub(super) fn step(
         &self,
         energy: &Energy<'_>,
         points: &mut [Vector],
         allowed: &dyn Fn(&[Vector]) -> bool,
     ) -> Option<Step> {
+        if self.cancellation.is_cancelled() {
+            return None;
+        }
         let before = self.energy(energy, points);
         let (direction, slope) = self.direction(energy, points)?;
         let start = self.positions(points);
         let mut length = 1.0;
         for _ in 0..HALVINGS {
+            if self.cancellation.is_cancelled() {
+                break;
+            }
             for ((&vertex, &from), &by) in self.unknowns.iter().zip(&start).zip(&direction) {
                 points[vertex as usize] = add(from, scale(by, length));
             }
@@ -199,19 +209,21 @@ impl Newton {
     /// A body that is held at few places, or nowhere, bends and turns as a whole: its equations
     /// need aggregates that turn. `positions` are then those of the unknowns.
     fn solver(&self, matrix: SparseMatrix<3>, positions: Option<Vec<Vector>>) -> Solver<3> {
-        if self.halo.communicator().size() == 1 {
-            return match positions {
-                Some(positions) => Ok(Box::new(Multigrid::with_rigid_bodies(
-                    matrix,
-                    positions,
-                    MultigridSettings::default(),
-                )?)),
-                None => {
-                    Ok(Box::new(ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS)))
-                }
-            };
+        let cancellation = self.cancellation.clone();
+        if self.halo.communicator().size() > 1 {
+            return Cancellable(cancellation).vector(Arc::new(matrix), &self.halo, &[]);
         }
-        crate::linear::solver(Arc::new(matrix), &self.halo)
+        Ok(match positions {
+            Some(positions) => {
+                let settings = MultigridSettings::default();
+                let multigrid = Multigrid::with_rigid_bodies(matrix, positions, settings)?;
+                Box::new(multigrid.with_cancellation(cancellation))
+            }
+            None => {
+                let gradients = ConjugateGradients::new(matrix)?.with_max_iterations(ITERATIONS);
+                Box::new(gradients.with_cancellation(cancellation))
+            }
+        })
     }
 
     fn energy(&self, energy: &Energy<'_>, points: &[Vector]) -> f64 {

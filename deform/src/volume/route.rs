@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{Impossible, VolumeError, VolumeOperator};
+use crate::cancellation::Cancellation;
 use crate::linear::Solvers;
 use crate::mesh::Domain;
 use crate::mesh::Vector;
@@ -114,4 +115,6 @@ pub struct Volume<'a> {
     pub solvers: &'a dyn Solvers,
     /// An operator of this boundary, set up on the mesh where it starts, if there is one already.
     pub operator: Option<&'a Arc<VolumeOperator>>,
+    /// What has it given up.
+    pub cancellation: &'a Cancellation,
 }

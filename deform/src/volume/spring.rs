@@ -39,7 +39,7 @@ pub(super) fn sprung(
     end: &Arc<[Vector]>,
     keeps: &dyn Fn(&[Vector], &[Vector]) -> bool,
 ) -> Option<Vec<Arc<[Vector]>>> {
-    let Volume { domain, boundary, .. } = volume;
+    let Volume { domain, boundary, cancellation, .. } = volume;
     let still = |vertex: &&u32| start[**vertex as usize] == end[**vertex as usize];
     let held: Vec<u32> = boundary.iter().filter(still).copied().collect();
     let free = domain.communicator().total(held.len()) == 0;
@@ -47,15 +47,12 @@ pub(super) fn sprung(
         if free { Rigid::nearest(start, shape, domain) } else { Rigid::IDENTITY }
     };
     let mut back = vec![Arc::clone(end)];
-    let arrived = Untangler::new(domain, &held).take_back(
-        end,
-        &|shape| turned(shape).of(start, 1.0),
-        keeps,
-        &mut |shape| {
+    let untangler = Untangler::new(domain, &held).with_cancellation(cancellation.clone());
+    let arrived =
+        untangler.take_back(end, &|shape| turned(shape).of(start, 1.0), keeps, &mut |shape| {
             back.push(shape.into());
             keeps(&turned(shape).of(start, 1.0), shape)
-        },
-    );
+        });
     if !arrived {
         return None;
     }
@@ -121,6 +118,9 @@ impl Untangler {
                 goes(&points, &moved)
             };
             let step = self.newton.step(&energy, &mut near, &allowed);
+            if self.is_given_up() {
+                return false;
+            }
             if step.is_some() {
                 self.numbering.scatter(&near, &mut points);
                 if arrives(&points) {

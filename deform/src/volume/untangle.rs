@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use super::corners::{Corner, corners, edges};
 use super::newton::{Energy, Newton};
 use super::{Improver, foldover};
+use crate::cancellation::Cancellation;
 use crate::communicator::Communicator;
 use crate::mesh::cell_geometry::Scratch;
 use crate::mesh::{CellType, Domain, Mesh, Numbering, Ordered, Vector};
@@ -120,6 +121,18 @@ impl Untangler {
         }
     }
 
+    /// The untangler with what has its work given up, which is looked at in each Newton step and
+    /// each sweep: it then says that no mesh was found.
+    #[must_use]
+    pub fn with_cancellation(mut self, cancellation: Cancellation) -> Self {
+        self.newton.cancellation = cancellation;
+        self
+    }
+
+    pub(super) fn is_given_up(&self) -> bool {
+        self.newton.cancellation.is_cancelled()
+    }
+
     /// Whether there is nothing that it could move in a mesh with these points.
     pub(super) fn is_idle(&self, points: &[Vector]) -> bool {
         let ranks = self.domain.communicator();
@@ -137,7 +150,7 @@ impl Untangler {
             if self.untangle_from(points, floor, Regularisation::Fitting) {
                 return true;
             }
-            if self.untangle_from(&mut again, floor, Regularisation::Large) {
+            if !self.is_given_up() && self.untangle_from(&mut again, floor, Regularisation::Large) {
                 points.copy_from_slice(&again);
                 return true;
             }
@@ -160,6 +173,9 @@ impl Untangler {
         let mut near = self.numbering.gather(points).into_owned();
         self.descends(&self.corners, from, &mut near);
         self.numbering.scatter(&near, points);
+        if self.is_given_up() {
+            return false;
+        }
         // 2. Cells that are valid at their corners and not inside.
         let mut found = self.quality(points);
         let mut with_edges = self.corners.clone();
@@ -172,6 +188,9 @@ impl Untangler {
             }
             self.descends(&with_edges, Regularisation::Fitting, &mut near);
             self.numbering.scatter(&near, points);
+            if self.is_given_up() {
+                return false;
+            }
             found = self.quality(points);
         }
         // 3. The quality of the worst cells.
@@ -184,7 +203,11 @@ impl Untangler {
 
     /// Whether sweeps bring every cell of a valid mesh up to `floor`.
     fn lift(&self, points: &mut [Vector], floor: f64, mut quality: Quality) -> bool {
-        let improver = || Improver::new(&self.domain, &self.boundary).lifting_to(LIFTED);
+        let improver = || {
+            let cancellation = self.newton.cancellation.clone();
+            let improver = Improver::new(&self.domain, &self.boundary).lifting_to(LIFTED);
+            improver.with_cancellation(cancellation)
+        };
         for _ in 0..ROUNDS {
             if quality.inverted > 0
                 || quality.min >= floor
@@ -234,6 +257,9 @@ impl Untangler {
             //    F(xᵏ, εᵏ)`.
             let energy = Energy { corners, epsilon, pull: None };
             let step = self.newton.step(&energy, points, &|_| true);
+            if self.is_given_up() {
+                break;
+            }
             least = self.newton.least(corners, points);
             let fall = step.map_or(0.0, |step| 1.0 - step.after / step.before);
             // 3. A valid mesh that has settled.

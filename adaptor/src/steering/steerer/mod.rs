@@ -23,10 +23,11 @@ use tombolo_pipelines::language::{HandedShape, Order};
 use super::{
     Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, Reservation,
     SurfaceMotion,
-    forecaster::Present,
+    forecaster::{Planning, Present},
     lent::{Own, Rounding},
     planner::{PlanRequest, Planner, Rejection},
     stack::StackError,
+    together::PlanTogether,
     worker::{Done, Worker},
 };
 use crate::{lock::lock, step::Moment};
@@ -65,6 +66,8 @@ pub(crate) struct Steerer {
     defaults: Defaults,
     planner: Arc<Mutex<Planner>>,
     worker: Option<Worker>,
+    /// On several ranks, what they plan together.
+    together: Option<Arc<PlanTogether>>,
     /// Whether the operator of the volume was set up, or is being set up.
     is_ready: bool,
     /// Extracts the skeleton, where an order could need it.
@@ -104,7 +107,7 @@ impl Steerer {
     ///
     /// On one process orders are planned on other threads. On several ranks no other thread could
     /// speak with them, so that orders are planned when their turn comes, on all ranks in the same
-    /// call. Collective, as are [`Steerer::advance`] and whatever else makes plans.
+    /// call, and given up together ([`PlanTogether`]). Collective, as are [`Steerer::advance`] and whatever else makes plans.
     pub(crate) fn new(
         shaper: Shaper,
         defaults: Defaults,
@@ -115,7 +118,9 @@ impl Steerer {
         let domain = shaper.domain().clone();
         if domain.communicator().size() > 1 {
             let quality = quality(domain.mesh().cells(), shaper.reference()).gathered(&domain);
+            let together = PlanTogether::new(shaper.cancellation().clone(), queue);
             let mut steerer = Self::of_shaper(shaper, defaults, log);
+            steerer.together = Some(Arc::new(together));
             steerer.reference_quality = Some((quality.min, quality.mean, quality.inverted));
             return Ok(steerer);
         }
@@ -143,10 +148,11 @@ impl Steerer {
                     tracing::warn!(run, "the first drag will extract the skeleton: {error}");
                 }
             }
-            None if self.domain.communicator().size() > 1 => {
-                lock(&self.planner).prepare(&self.defaults.deform);
+            None => {
+                if let Some(together) = &self.together {
+                    together.run(None, || lock(&self.planner).prepare(&self.defaults.deform));
+                }
             }
-            None => {}
         }
     }
 
@@ -182,6 +188,7 @@ impl Steerer {
             defaults,
             planner,
             worker: None,
+            together: None,
             is_ready: false,
             skeleton: None,
             present,
@@ -240,14 +247,23 @@ impl Steerer {
 
     /// A forecaster for other threads; `None` where the worker has ended.
     pub(crate) fn forecaster(&self) -> Option<Forecaster> {
-        let jobs = Arc::clone(self.worker.as_ref()?.jobs());
-        Some(Forecaster { present: Arc::clone(&self.present), jobs })
+        let planning = match &self.together {
+            Some(together) => Planning::Together(Arc::clone(together)),
+            None => Planning::Beside(Arc::clone(self.worker.as_ref()?.jobs())),
+        };
+        Some(Forecaster { present: Arc::clone(&self.present), planning })
     }
 
     /// The forecast of an order, made at once. Collective.
     pub(crate) fn forecast(&self, order: &Order) -> Forecast {
         match self.asked(order) {
-            Ok((_, asked)) => lock(&self.planner).forecast(&asked),
+            Ok((_, asked)) => {
+                let forecast = || lock(&self.planner).forecast(&asked);
+                match &self.together {
+                    Some(together) => together.run(None, forecast),
+                    None => forecast(),
+                }
+            }
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
                 Forecast::rejected(reason, None, None, seconds)
@@ -362,7 +378,8 @@ impl Steerer {
     }
 
     /// Brings orders as far as they can come now; says whether anything changed. Called at safe
-    /// points only.
+    /// points only. On several ranks an order whose plan is given up waits again, in its place, and
+    /// so do those behind it: the next call brings what it was given up for.
     pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
         let mut changed = self.reject_overdue(moment);
         loop {
@@ -380,8 +397,11 @@ impl Steerer {
                 continue;
             }
             let Some(task) = self.waiting.pop_front() else { return changed };
-            self.start(task, moment, step_seconds);
             changed = true;
+            if let Some(given_up) = self.start(task, moment, step_seconds) {
+                self.waiting.push_front(given_up);
+                return changed;
+            }
         }
     }
 
@@ -424,11 +444,15 @@ impl Steerer {
         changed
     }
 
-    fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) {
+    /// Has the shapes of an order found; of one that the ranks gave up meanwhile, the order.
+    fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) -> Option<Task> {
         let Task { id, order, background, reservation } = task;
         let (stack, asked) = match self.asked(&order) {
             Ok(asked) => asked,
-            Err(error) => return self.log.reject(&id, moment, &error.into()),
+            Err(error) => {
+                self.log.reject(&id, moment, &error.into());
+                return None;
+            }
         };
         self.log.update(&id, |order| order.status = OrderStatus::Computing);
         let defaults = self.defaults.clone();
@@ -449,13 +473,25 @@ impl Steerer {
             }
             worker => {
                 let begun = Instant::now();
-                let plan = match worker {
-                    Some(worker) => worker.plan_here(&self.planner, &computing.asked),
-                    None => lock(&self.planner).plan(&computing.asked),
+                let plan = match (worker, &self.together) {
+                    (Some(worker), _) => worker.plan_here(&self.planner, &computing.asked),
+                    (None, None) => lock(&self.planner).plan(&computing.asked),
+                    (None, Some(together)) => {
+                        // What a run has done before, nobody takes back.
+                        let id = self.recorded.is_none().then_some(&*computing.id);
+                        let plan = || lock(&self.planner).plan(&computing.asked);
+                        let plan = together.run(id, plan);
+                        if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
+                            let Computing { id, order, _reservation: reservation, .. } = computing;
+                            return Some(Task { id, order, background, reservation });
+                        }
+                        plan
+                    }
                 };
                 self.commit(computing, plan, moment, begun, step_seconds);
             }
         }
+        None
     }
 
     fn finish(&mut self, done: Done, moment: Moment, step_seconds: Option<f64>) {

@@ -8,6 +8,7 @@ mod worth;
 
 use super::barrier::Simplex;
 use super::colours::{Held, colours};
+use crate::cancellation::Cancellation;
 use crate::communicator::{Communicator, Halo};
 use crate::mesh::{Domain, Numbering, Ordered, Vector};
 use crate::topology::{Groups, marked};
@@ -78,6 +79,7 @@ pub struct Improver {
     good: f64,
     /// Whether sweeps go on whatever they gain.
     untiring: bool,
+    cancellation: Cancellation,
 }
 
 /// The vertices that other ranks have too.
@@ -124,6 +126,7 @@ impl Improver {
             interface: None,
             good: GOOD,
             untiring: false,
+            cancellation: Cancellation::default(),
         };
         let around = |vertex: u32, visit: &mut dyn FnMut(u32)| {
             for &code in improver.incident.of(vertex) {
@@ -155,6 +158,13 @@ impl Improver {
         });
         improver.colours = colours;
         improver
+    }
+
+    /// The improver with what has its work given up, which is looked at for each colour of a sweep:
+    /// nothing has moved then.
+    #[must_use]
+    pub fn with_cancellation(self, cancellation: Cancellation) -> Self {
+        Self { cancellation, ..self }
     }
 
     /// The improver where cells are lifted to `good` times the quality that they have in the
@@ -192,13 +202,17 @@ impl Improver {
             tried = self.colours.len().min(1);
             sweeping.through(&mut near, 0..tried, least);
             let part = 1.0 / self.colours.len().max(1) as f64;
-            if !self.qualities(&near).are_worth_more(&before, fixed, part) {
+            let worth = self.qualities(&near).are_worth_more(&before, fixed, part);
+            if !worth || self.cancellation.is_cancelled() {
                 return false;
             }
         }
         for _ in 0..sweeps {
             sweeping.through(&mut near, tried..self.colours.len(), last.least);
             tried = 0;
+            if self.cancellation.is_cancelled() {
+                return false;
+            }
             let now = self.qualities(&near);
             let worth = self.untiring || now.are_worth_more(&last, fixed, 1.0);
             if worth || now.are_better(&last, fixed) {

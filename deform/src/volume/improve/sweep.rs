@@ -41,12 +41,15 @@ impl<'a> Sweeps<'a> {
         self.awake.iter().filter(|awake| !awake.load(Ordering::Relaxed)).count()
     }
 
-    /// Sweeps through the vertices of some colours, with the barrier below the `least` quality.
-    /// Collective.
+    /// Sweeps through the vertices of some colours, with the barrier below the `least` quality; not
+    /// through all where it is given up. Collective.
     pub(super) fn through(&self, points: &mut [Vector], colours: Range<usize>, least: f64) {
         let gap = GAP * least * (1.0 - least).max(LOST);
         let barrier = Barrier { floor: least - gap, gap };
         for colour in colours {
+            if self.improver.cancellation.is_cancelled() {
+                return;
+            }
             self.own(points, &barrier, &self.improver.colours[colour]);
             if let Some(Interface { held, colours }) = &self.improver.interface {
                 self.shared(points, &barrier, held, &colours[colour]);
