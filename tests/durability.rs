@@ -31,28 +31,53 @@ fn earlier(bytes: u64) -> String {
     line.repeat(usize::try_from(bytes).expect("a size") / line.len())
 }
 
-#[test]
-fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
+/// A run whose journal has little room left: the disk is full for every file of [`LIMIT`].
+fn on_a_disk_that_is_nearly_full() -> (Small, Run) {
     let small = Small::new();
     small.write("pipelines.json", &pipelines());
     std::fs::create_dir_all(small.path("out")).expect("a folder");
     std::fs::write(small.path("out/journal.jsonl"), earlier(LIMIT - 2000)).expect("a journal");
-    // The disk is full for every file that is as long as this.
     let arguments = small.arguments(&["--pipelines", "@pipelines.json", "--steps", "12"]);
     let script = format!("trap '' XFSZ; ulimit -S -f {BLOCKS}; exec \"$0\" \"$@\"");
     let flow = programs().join("flow");
     let mut shell = Command::new("bash");
-    let mut run = Run::start(shell.args(["-c", &script]).arg(flow).args(arguments));
+    let run = Run::start(shell.args(["-c", &script]).arg(flow).args(arguments));
+    (small, run)
+}
+
+/// An order for which that journal has no room.
+fn long() -> Value {
+    let mut long = pinch(0.9);
+    long["edits"][0]["scale_direction"]["name"] = json!("x".repeat(190));
+    let edit = long["edits"][0].clone();
+    long["edits"] = json!(vec![edit; 20]);
+    long
+}
+
+#[test]
+fn the_report_of_a_run_says_that_its_journal_was_lost() {
+    let (small, mut run) = on_a_disk_that_is_nearly_full();
+    let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
+    driver.wait_for("hello", |hello| hello["role"] == "driver");
+    driver.wait_for("status", |status| status["paused"] == true);
+    driver.send(&json!({"id": "long", "order": long()}));
+    driver.wait_for("error", |error| error["id"] == "long");
+    driver.resume();
+    let (_, text) = run.finish(PATIENCE);
+    let report = small.read("report.json");
+    let lost = report["journal_lost"].as_str();
+    assert!(lost.is_some_and(|why| why.contains("File too large")), "{report}\n{text}");
+}
+
+#[test]
+fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
+    let (small, mut run) = on_a_disk_that_is_nearly_full();
     let link = run.link();
     let mut driver = Viewer::connect(&link).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     driver.wait_for("status", |status| status["paused"] == true);
 
-    let mut long = pinch(0.9);
-    long["edits"][0]["scale_direction"]["name"] = json!("x".repeat(190));
-    let edit = long["edits"][0].clone();
-    long["edits"] = json!(vec![edit; 20]);
-    driver.send(&json!({"id": "long", "order": long}));
+    driver.send(&json!({"id": "long", "order": long()}));
     let refused = driver.wait_for("error", |error| error["id"] == "long");
     let message = refused["message"].as_str().expect("a message");
     assert!(message.contains("the journal cannot be written"), "{message}");

@@ -8,8 +8,8 @@ use pyo3::types::{PyDict, PyList};
 use serde_json::json;
 use tombolo::deform::cancellation::Cancellation;
 use tombolo::deform::edit::Edit;
-use tombolo::deform::features::FeatureSettings;
-use tombolo::deform::mesh::{Mesh, Vector};
+use tombolo::deform::features::{FeatureSettings, check_feature_names, misplaced_faces};
+use tombolo::deform::mesh::{self, FeatureSource, Mesh, Vector};
 use tombolo::deform::quality::{quality, scaled_jacobians};
 use tombolo::deform::shape::{Refused, Request};
 use tombolo::deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
@@ -43,6 +43,15 @@ fn rejected(py: Python<'_>, refused: &Refused) -> PyErr {
     let _ = report.set_item("fraction", refused.feasible_fraction());
     let _ = report.set_item("min_scaled_jacobian", refused.min_scaled_jacobian());
     RejectedError::new_err((refused.to_string(), report.unbind()))
+}
+
+/// Refuses named parts that have no face of the mesh, as a run does.
+fn check_features(mesh: &Mesh) -> Result<(), mesh::MeshError> {
+    let FeatureSource::Faces(tagged) = mesh.features() else { return Ok(()) };
+    misplaced_faces(tagged, mesh.cells()).check(tagged)?;
+    let mut numbers = tagged.tags.clone();
+    numbers.sort_unstable();
+    check_feature_names(&tagged.names, &numbers)
 }
 
 impl Shaper {
@@ -116,6 +125,7 @@ impl Shaper {
                 let channel =
                     channels.0.first().ok_or_else(|| mistake("found no mesh, expected one"))?;
                 let mesh = Arc::new(channel.to_mesh().map_err(of_run)?);
+                check_features(&mesh).map_err(mistake)?;
                 let surface = Arc::new(of_mesh(&mesh, angle).map_err(mistake)?);
                 let shaper = tombolo::deform::shape::Shaper::new(&mesh, Arc::clone(&surface))
                     .map_err(mistake)?;

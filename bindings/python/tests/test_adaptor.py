@@ -419,6 +419,7 @@ def test_masked_values_are_refused():
         (mesh(masked), "points"),
         (mesh(separate), "points, component 0"),
         (mesh(vertex_features=np.ma.masked_equal(np.arange(27), 5)), "vertex_features"),
+        (mesh(vertex_features=np.arange(27) / 2), "vertex_features: found 0.5 at entry 1; expected a whole number"),
     ):
         with pytest.raises(tombolo.MeshError, match=f"{what}.* masked"):
             _native.lent(given)

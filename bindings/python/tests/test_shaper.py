@@ -98,6 +98,11 @@ def test_features_and_skeleton_are_those_of_the_program(tmp_path):
     assert np.array_equal(read.point_data["radius"], skeleton.radii)
 
 
+def test_a_named_part_that_is_no_face_of_the_mesh_is_refused():
+    with pytest.raises(tombolo.MeshError, match="lid.* no face of any cell"):
+        shaper_of(faces={**FACES, "lid": np.array([[0, 1, len(POINTS) - 1]])})
+
+
 def test_meshes_of_others_are_taken(tmp_path):
     shaper = shaper_of(faces=None)
     edits = bend(shaper)

@@ -17,7 +17,7 @@ use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
 use tombolo_flow::program::{Options, Run};
 use tombolo_flow::ranks::{agreed, threads};
-use tombolo_flow::report::make_file;
+use tombolo_flow::report::{empty_file, make_file};
 
 /// Solves incompressible flow on a mesh of tetrahedra that can be steered: watched in a browser,
 /// and given another shape while it runs.
@@ -229,6 +229,9 @@ fn run(
     }
     let mut run = Run::solved_by(Arc::clone(&ranks), solvers, &options)?;
     agreed(&*ranks, open(&mut run))?;
+    if let Some(file) = &arguments.report {
+        empty_file(&*ranks, file)?;
+    }
     let report = run.finish()?;
     if let Some(file) = arguments.report.filter(|_| is_first) {
         let text = serde_json::to_string_pretty(&report)? + "\n";

@@ -269,6 +269,7 @@ impl Run {
             stream: adaptor.stream,
             pipelines: adaptor.pipelines,
             flow: self.flow,
+            journal_lost: adaptor.journal_lost,
             unwritten: self.unwritten.told,
             error,
         })

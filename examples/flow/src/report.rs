@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::path::Path;
 
 use serde::Serialize;
@@ -37,6 +37,9 @@ pub struct Report {
     pub pipelines: Vec<PipelineReport>,
     /// The flow.
     pub flow: FlowReport,
+    /// Why the journal could not be written when the run ended, where it could not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub journal_lost: Option<String>,
     /// What could not be written while the run went on, and why: the saved state, the history. Of
     /// several failures in a row the first, and no more than a hundred in all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -135,18 +138,35 @@ impl Unwritten {
     }
 }
 
-/// Makes the file that the report of a run is to go to, with its folder: what the run comes to is not
-/// to be lost for a name at which no file can be, and what another run came to is not to be taken
-/// for it. The first rank does so. Collective.
+/// Opens the file that the report of a run is to go to, and makes it, with its folder, where it is
+/// missing: what the run comes to is not to be lost for a name at which no file can be. A report that
+/// is there stays as it is, until [`empty_file`]. The first rank does so. Collective.
 ///
 /// # Errors
 /// [`ProgramError::File`], on several ranks the same on all of them.
 pub fn make_file(communicator: &dyn Communicator, file: &Path) -> Result<(), ProgramError> {
-    let made = match communicator.rank() {
-        0 => make_folder_of(file).and_then(|()| File::create(file)).map(drop),
-        _ => Ok(()),
-    };
-    agreed(communicator, made.map_err(|source| ProgramError::File { file: file.into(), source }))
+    on_first(communicator, file, || {
+        make_folder_of(file)?;
+        OpenOptions::new().write(true).create(true).truncate(false).open(file)
+    })
+}
+
+/// Empties the file that the report of a run is to go to, once the run has begun: what another run
+/// came to is not to be taken for it. The first rank does so. Collective.
+///
+/// # Errors
+/// As those of [`make_file`].
+pub fn empty_file(communicator: &dyn Communicator, file: &Path) -> Result<(), ProgramError> {
+    on_first(communicator, file, || File::create(file))
+}
+
+fn on_first(
+    communicator: &dyn Communicator,
+    file: &Path,
+    open: impl FnOnce() -> std::io::Result<File>,
+) -> Result<(), ProgramError> {
+    let opened = if communicator.rank() == 0 { open().map(drop) } else { Ok(()) };
+    agreed(communicator, opened.map_err(|source| ProgramError::File { file: file.into(), source }))
 }
 
 impl FlowReport {

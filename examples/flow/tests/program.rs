@@ -10,7 +10,7 @@ use tombolo_flow::Settings;
 use tombolo_flow::case::{Case, CaseError};
 use tombolo_flow::parts::Dealing;
 use tombolo_flow::program::{Options, Run};
-use tombolo_flow::report::{Report, make_file};
+use tombolo_flow::report::{Report, empty_file, make_file};
 use tombolo_pipelines::files::{self, Compression};
 
 const CASE: &str = r#"{
@@ -554,9 +554,13 @@ fn the_file_of_the_report_is_made_with_its_folder_or_refused_by_all() {
         threads::run(2, |ranks| make_file(&ranks, file).err().map(|error| error.to_string()))
     };
     assert_eq!(make(&report), [None, None]);
-    // What a run before has left is not taken for the report of one that comes to no end.
+    // What a run before has left stays where the next one does not begin, and is not taken for the
+    // report of one that comes to no end.
     std::fs::write(&report, "{}").unwrap();
     assert_eq!(make(&report), [None, None]);
+    assert_eq!(std::fs::read_to_string(&report).unwrap(), "{}");
+    let emptied = threads::run(2, |ranks| empty_file(&ranks, &report).is_ok());
+    assert_eq!(emptied, [true, true]);
     assert_eq!(std::fs::read_to_string(&report).unwrap(), "");
     let refused = make(&report.join("report.json"));
     assert!(

@@ -364,10 +364,17 @@ fn ghost_bits(channel: &Channel<'_>) -> Option<Vec<u8>> {
 fn features(channel: &Channel<'_>) -> Result<FeatureSource, RunError> {
     let names = channel.feature_names.clone();
     if channel.has_vertex_features() {
-        let arrays = channel.blocks.iter().filter_map(|block| block.domain.roles.vertex_features);
-        let number = |array: &Array<'_>, at: usize| array.integer(at).unwrap_or(0);
-        let tags =
-            arrays.flat_map(|array| (0..array.len()).map(move |at| number(&array, at))).collect();
+        let mut tags = Vec::new();
+        for domain in channel.blocks.iter().map(|block| &block.domain) {
+            let Some(array) = domain.roles.vertex_features else { continue };
+            for index in 0..array.len() {
+                tags.push(array.integer(index).ok_or_else(|| {
+                    let label = domain.label.part("vertex_features", "vertex_features");
+                    let found = format!("{} at entry {index}", array.get(index));
+                    label.wrong(found, "a whole number for each vertex")
+                })?);
+            }
+        }
         return Ok(FeatureSource::Vertices(TaggedVertices { tags, names }));
     }
     let mut tagged = TaggedFaces { names, ..TaggedFaces::default() };
