@@ -157,7 +157,13 @@ fn work(tasks: &Receiver<Task>, faults: &Mutex<Vec<String>>, since: Option<Momen
         since: since.map(|since| since.cycle),
     };
     while let Ok(task) = tasks.recv() {
-        let Task::Write(job) = task else { continue };
+        let job = match task {
+            Task::Write(job) => job,
+            Task::Answer(answer) => {
+                drop(answer);
+                continue;
+            }
+        };
         let outcome = match &job.content {
             Content::Extract(extract, membership) => {
                 written.extract(&job, extract, membership.as_ref())
