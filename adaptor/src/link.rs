@@ -1,4 +1,4 @@
-//! The link that a run prints.
+//! The link to a run.
 
 use std::{
     fmt,
@@ -12,7 +12,7 @@ use tombolo_pipelines::language::is_fingerprint;
 /// A text that is no link.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, https:// or unix:/PATH?token=TOKEN, as the run has printed it"
+    "found the link {found:?}, and {reason}; expected http://HOST:PORT/?token=TOKEN, https:// or unix:/PATH?token=TOKEN, as it stands in the run's file of links"
 )]
 pub struct LinkError {
     /// The text, without its token.
@@ -23,8 +23,10 @@ pub struct LinkError {
 
 /// Bytes that a link may have.
 const LENGTH: usize = 4096;
+/// How links begin.
+pub(crate) const BEGINNINGS: [&str; 3] = ["http://", "https://", "unix:"];
 
-/// The address of a run and the token that lets a client in, as the run prints them:
+/// The address of a run and the token that lets a client in, as they stand in its file of links:
 /// `http://HOST:PORT/?token=TOKEN`, behind a proxy also with a path before the `?`;
 /// `https://HOST:PORT/?token=TOKEN#sha256=FINGERPRINT`, where the certificate of this fingerprint
 /// counts, or without it one that this machine trusts; `unix:PATH?token=TOKEN`.
@@ -102,6 +104,11 @@ impl Link {
         format!("{}:{}", self.host, self.port)
     }
 
+    /// Whether it has no path of its own, as a run behind a relay has one.
+    pub(crate) fn is_bare(&self) -> bool {
+        self.prefix.is_empty()
+    }
+
     pub(crate) fn token(&self) -> &str {
         &self.token
     }
@@ -154,8 +161,14 @@ impl FromStr for Link {
         if !text.chars().all(|c| c.is_ascii_graphic()) {
             return Err(wrong("it holds a character that no link has"));
         }
+        if !BEGINNINGS.iter().any(|begin| text.starts_with(begin)) {
+            return Err(wrong("it does not begin with http://, https:// or unix:/"));
+        }
         let (text, fragment) = text.split_once('#').unwrap_or((text, ""));
         let (place, query) = text.split_once('?').ok_or_else(|| wrong("it has no token"))?;
+        if query.split('&').any(|pair| pair.starts_with("key=")) {
+            return Err(wrong("it opens one browser, once, and lets no program in"));
+        }
         let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
         let known = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
         let token = token.filter(|token| !token.is_empty() && token.chars().all(known));
@@ -286,5 +299,14 @@ mod tests {
         }
         let error = read("http://host:x/?token=secret").expect_err("no port").to_string();
         assert!(!error.contains("secret"), "{error}");
+        for (wrong, reason) in [
+            ("127.0.0.1:7070", "it does not begin with http://"),
+            ("http://127.0.0.1:7070/?key=secret", "it opens one browser, once"),
+            ("unix:/tombolo.sock?key=secret", "it opens one browser, once"),
+            ("http://127.0.0.1:7070/", "it has no token"),
+        ] {
+            let error = read(wrong).expect_err("no link for programs").to_string();
+            assert!(error.contains(reason) && !error.contains("secret"), "{error}");
+        }
     }
 }

@@ -395,12 +395,13 @@ fn what_is_no_run_or_not_this_one_is_told_by_name() {
         &b"SSH-2.0-OpenSSH_9.6\r\n"[..],
         b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nhi",
         b"HTTP/1.1 404 Not Found\r\n\r\n",
-        b"",
         b"\xff\x00\xfe\xfe\xfe\xfe\r\n\r\n",
     ] {
         let error = answered_by(nonsense);
         assert!(matches!(error, ClientError::NotTombolo { .. }), "{error:?}");
     }
+    let error = answered_by(b"");
+    assert!(matches!(error, ClientError::HungUp { .. }), "{error:?}");
     let run = Run::new(LINK_TO_ALL);
     let wrong: Link = format!("http://{}/?token=0123", run.address).parse().expect("a link");
     let error = Client::connect(&wrong, &Options::default()).err();

@@ -67,10 +67,10 @@ fn a_run_is_steered_through_tls_by_those_who_know_its_certificate() {
         let error = connect(&with_fingerprint(&run.link, &fingerprint)).err().expect("refused");
         assert!(matches!(error, ClientError::Certificate { .. }), "{error}");
     }
-    // Nothing is said to those who do not encrypt.
+    // Those who do not encrypt are told that, and nothing else.
     let plain = run.link.to_string().replacen("https://", "http://", 1).parse().expect("a link");
     let error = connect(&plain).err().expect("refused");
-    assert!(matches!(error, ClientError::NotTombolo { .. }), "{error}");
+    assert!(matches!(error, ClientError::Encrypted { .. }), "{error}");
 }
 
 #[test]

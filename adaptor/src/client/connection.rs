@@ -10,6 +10,7 @@ use tokio_tungstenite::{
     tungstenite::{
         Error, Message,
         client::IntoClientRequest,
+        error::ProtocolError,
         protocol::{WebSocketConfig, frame::CloseFrame},
     },
 };
@@ -17,10 +18,13 @@ use tombolo_pipelines::{encode::Decoder, limits::DOCUMENT};
 
 use super::{
     ClientError, Event, Link, Options,
-    get::{not_tombolo, open, refused, shown},
+    get::{is_encrypted, not_tombolo, open, refused, shown},
     state::Shared,
 };
-use crate::dial::Stream;
+use crate::{
+    dial::{self, Stream},
+    stream::relay::{NOT_CONNECTED, SILENT_RUN},
+};
 
 /// How long a server may take to answer the request for a WebSocket, and to say hello then.
 const HELLO: Duration = Duration::from_secs(20);
@@ -134,8 +138,17 @@ async fn join(link: &Link, watches: bool, shared: &Shared) -> Result<Socket, Cli
             let status = response.status().as_u16();
             return Err(match status {
                 401 | 403 => refused(link, "ws", status, body),
+                _ if [NOT_CONNECTED, SILENT_RUN].iter().any(|said| said.as_bytes() == body) => {
+                    ClientError::NotAtRelay { address: link.address(), reason: shown(body) }
+                }
                 _ => wrong(format!("the status {status} ({})", shown(body))),
             });
+        }
+        Err(error) if is_end(&error) => {
+            return Err(ClientError::HungUp { address: link.address() });
+        }
+        Err(_) if is_encrypted(link).await => {
+            return Err(ClientError::Encrypted { address: link.address() });
         }
         Err(error) => return Err(wrong(shown(error.to_string().as_bytes()))),
     };
@@ -160,6 +173,15 @@ async fn join(link: &Link, watches: bool, shared: &Shared) -> Result<Socket, Cli
         state.put(Event::Hello(hello), &text);
     });
     Ok(socket)
+}
+
+/// Whether a connection has ended where an answer was expected.
+fn is_end(error: &Error) -> bool {
+    match error {
+        Error::ConnectionClosed | Error::Protocol(ProtocolError::HandshakeIncomplete) => true,
+        Error::Io(error) => dial::is_end(error),
+        _ => false,
+    }
 }
 
 /// The first text; the close frame where there is none.

@@ -39,6 +39,32 @@ pub enum ClientError {
         /// The reason why it is not trusted.
         reason: String,
     },
+    /// What answers there is encrypted, and the link is not.
+    #[error("what answers on {address} is encrypted, and the link begins with http://")]
+    Encrypted {
+        /// The host and port.
+        address: String,
+    },
+    /// What answers there is not encrypted, and the link is.
+    #[error("what answers on {address} is not encrypted, and the link begins with https://")]
+    NotEncrypted {
+        /// The host and port.
+        address: String,
+    },
+    /// A connection is taken there, and closed before anything was answered.
+    #[error("{address} takes the connection, and closes it without an answer")]
+    HungUp {
+        /// The host and port.
+        address: String,
+    },
+    /// A relay answers there, which does not reach the run.
+    #[error("a relay answers on {address}, and does not reach the run: {reason}")]
+    NotAtRelay {
+        /// The host and port.
+        address: String,
+        /// The relay's reason.
+        reason: String,
+    },
     /// A run answers there, and the token is not its own (401).
     #[error("{address} answers, but the token of this link is not that of the run there (401)")]
     WrongToken {

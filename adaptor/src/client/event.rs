@@ -89,6 +89,12 @@ pub struct Hello {
     pub back: Option<String>,
     /// Whether this client steers.
     pub role: Role,
+    /// Whether this client may have the wheel; `None` where nothing is said of it.
+    #[serde(default)]
+    pub may_drive: Option<bool>,
+    /// From where to where a recording goes, where this is one and no run.
+    #[serde(default)]
+    pub recording: Option<Value>,
     /// The live views.
     #[serde(default)]
     pub views: Vec<View>,

@@ -13,6 +13,10 @@ use crate::link::Way;
 
 /// How long an answer may take as a whole. The first request for a surface has it encoded.
 const ANSWER: Duration = Duration::from_secs(120);
+/// How long it may take to hear whether something is encrypted.
+const PROBE: Duration = Duration::from_secs(5);
+/// How an alert of TLS begins.
+const ALERT: [u8; 2] = [21, 3];
 /// Bytes that the head of an answer may have, and its headers.
 const HEAD: usize = 1 << 14;
 const HEADERS: usize = 64;
@@ -62,7 +66,24 @@ fn failed(link: &Link, error: DialError) -> ClientError {
         DialError::Refused => ClientError::Refused { address },
         DialError::Unreachable(reason) => ClientError::Unreachable { address, reason },
         DialError::Certificate(reason) => ClientError::Certificate { address, reason },
+        DialError::NotEncrypted => ClientError::NotEncrypted { address },
+        DialError::HungUp => ClientError::HungUp { address },
     }
+}
+
+/// Whether what answers where a plain link leads is encrypted: it refuses plain text by an alert of TLS.
+pub(super) async fn is_encrypted(link: &Link) -> bool {
+    if *link.way() != Way::Plain {
+        return false;
+    }
+    let asked = async {
+        let mut stream = open(link).await.ok()?;
+        stream.write_all(b"GET / HTTP/1.0\r\n\r\n").await.ok()?;
+        let mut begun = [0; 2];
+        stream.read_exact(&mut begun).await.ok()?;
+        Some(begun == ALERT)
+    };
+    matches!(timeout(PROBE, asked).await, Ok(Some(true)))
 }
 
 /// Asks for a path of a run, of whose answer no more than `most` bytes are read.

@@ -252,6 +252,12 @@ impl Client {
     /// [`ClientError::NotDriver`] where somebody else drives, or after `patience`.
     pub fn drive(&self, patience: Duration) -> Result<(), ClientError> {
         let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
+        let hello = self.hello();
+        if hello.as_ref().is_some_and(|hello| hello.recording.is_some()) {
+            let reason = "this is a recording, of which nothing can be ordered".into();
+            return Err(ClientError::NotDriver { reason });
+        }
+        let may_drive = hello.is_none_or(|hello| hello.may_drive != Some(false));
         loop {
             if self.drives() {
                 return Ok(());
@@ -282,7 +288,7 @@ impl Client {
                 Some(Event::Error(error)) => error.message,
                 _ => "nothing was said".into(),
             };
-            let kept = self.status().is_none_or(|status| status.driver.is_none());
+            let kept = may_drive && self.status().is_none_or(|status| status.driver.is_none());
             if !kept || Instant::now() >= until {
                 return Err(ClientError::NotDriver { reason });
             }

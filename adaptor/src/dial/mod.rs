@@ -2,9 +2,9 @@
 
 mod tls;
 
-use std::{sync::Arc, time::Duration};
+use std::{io, sync::Arc, time::Duration};
 
-use rustls::pki_types::ServerName;
+use rustls::{InvalidMessage, pki_types::ServerName};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
@@ -35,6 +35,30 @@ pub(crate) enum DialError {
     /// The certificate is not the one that was expected.
     #[error("its certificate: {0}")]
     Certificate(String),
+    /// What answers there is not encrypted.
+    #[error("what answers there is not encrypted")]
+    NotEncrypted,
+    /// The connection was closed before anything was answered.
+    #[error("it closes the connection without an answer")]
+    HungUp,
+}
+
+/// Whether an error says that the other side has ended a connection.
+pub(crate) fn is_end(error: &io::Error) -> bool {
+    use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset, UnexpectedEof};
+    matches!(error.kind(), UnexpectedEof | ConnectionReset | ConnectionAborted | BrokenPipe)
+}
+
+/// Why the two sides did not agree on an encryption.
+fn not_agreed(error: &io::Error) -> DialError {
+    let of_tls = error.get_ref().and_then(|source| source.downcast_ref::<rustls::Error>());
+    match of_tls {
+        Some(rustls::Error::InvalidMessage(InvalidMessage::InvalidContentType)) => {
+            DialError::NotEncrypted
+        }
+        None if is_end(error) => DialError::HungUp,
+        _ => DialError::Certificate(error.to_string()),
+    }
 }
 
 /// Connects to a host; encrypted where a `certificate` is asked for: that of this fingerprint, or without
@@ -82,7 +106,7 @@ pub(crate) async fn encrypt(
     let name = ServerName::try_from(host.to_owned()).map_err(|error| wrong(error.to_string()))?;
     match timeout(CONNECT, TlsConnector::from(Arc::new(config)).connect(name, stream)).await {
         Ok(Ok(stream)) => Ok(Box::new(stream)),
-        Ok(Err(error)) => Err(wrong(error.to_string())),
+        Ok(Err(error)) => Err(not_agreed(&error)),
         Err(_) => Err(DialError::Unreachable("it does not shake hands".into())),
     }
 }

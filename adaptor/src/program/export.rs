@@ -98,7 +98,7 @@ const ROWS: usize = 4 << 20;
 /// Writes files of a recording: VTK and CSV where nothing else is asked for.
 pub(crate) fn export(options: &Options) -> Result<(), Failure> {
     let mut recording = Recording::open(&options.file)?;
-    std::fs::create_dir_all(&options.out)?;
+    std::fs::create_dir_all(&options.out).map_err(|error| unwritten(&options.out, &error))?;
     let is_all = !(options.vtk || options.csv || options.png);
     let (vtk, csv) = (options.vtk || is_all, options.csv || is_all);
     let mut decoder = Decoder::new();
@@ -139,7 +139,8 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
     }
     let mut names = Names::default();
     for (pipeline, table) in &tables {
-        table.write(&options.out.join(format!("{}.csv", names.take(pipeline))))?;
+        let path = options.out.join(format!("{}.csv", names.take(pipeline)));
+        table.write(&path).map_err(|error| unwritten(&path, &error))?;
     }
     outcome?;
     for (name, view) in &views {
@@ -161,6 +162,10 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Wrong(format!("{} cannot be written: {error}", path.display()))
 }
 
 /// Whether a message is the first of a run: later greetings of it have no orders.

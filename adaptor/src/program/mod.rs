@@ -20,9 +20,10 @@ use std::{
 };
 
 use crate::pipelines::{language, limits};
-use clap::{Parser, Subcommand};
+use clap::{Parser, Subcommand, error::ErrorKind};
 
-const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused.
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 something is wrong with what was given; 2 the shape that was asked for is refused, or
+there is no such task.
 The tasks that take a LINK have exit codes of their own; their --help tells them.";
 
 /// Checks configurations, looks at meshes, gives them other shapes without a solver, and watches and
@@ -98,6 +99,10 @@ impl<E: std::error::Error> From<E> for Failure {
 /// code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<OsString> = arguments.into_iter().collect();
+    if let Some(message) = remote::several(&given) {
+        eprintln!("tombolo: {message}");
+        return 2;
+    }
     let arguments = match Arguments::try_parse_from(&given) {
         Ok(arguments) => arguments,
         Err(asked) => return answer(&asked, given.get(1)),
@@ -134,12 +139,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 }
 
 /// Prints the help or version that was asked for, or what is wrong with the arguments: 1 then,
-/// because 2 says that a shape is refused. Of a task that reaches a run it is 2.
+/// because 2 says that a shape is refused. Of a task that reaches a run it is 2, and so it is of one that
+/// there is not, which may have been meant as such a task.
 fn answer(asked: &clap::Error, task: Option<&OsString>) -> u8 {
     let printed = asked.print().is_ok();
     match task.and_then(|task| task.to_str()) {
         _ if printed && asked.exit_code() == 0 => 0,
         Some(task) if remote::has(task) => 2,
+        _ if asked.kind() == ErrorKind::InvalidSubcommand => 2,
         _ => 1,
     }
 }

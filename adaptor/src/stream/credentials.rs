@@ -253,9 +253,9 @@ impl Credentials {
     /// The credentials of a request. A secret in its header or query counts alone, also where it is wrong;
     /// the cookie counts where there is none.
     pub(super) fn shown(&self, headers: &HeaderMap, uri: &Uri) -> Shown {
-        let bearer = headers.get(header::AUTHORIZATION).map(|value| {
-            value.to_str().ok().and_then(|text| text.strip_prefix("Bearer ")).unwrap_or_default()
-        });
+        let bearer = headers
+            .get(header::AUTHORIZATION)
+            .map(|value| value.to_str().ok().and_then(bearer_of).unwrap_or_default());
         if let Some(secret) = bearer.or_else(|| parameter(uri, "token")) {
             return self.holder(secret).map_or(Shown::Wrong, Shown::Right);
         }
@@ -285,6 +285,12 @@ impl Credentials {
         let port = port.and_then(|(_, port)| port.parse::<u16>().ok());
         format!("{}-{}", self.cookie, port.unwrap_or(80))
     }
+}
+
+/// The secret in an `Authorization` header, the scheme of which is written in any case.
+fn bearer_of(text: &str) -> Option<&str> {
+    let (scheme, secret) = text.split_once(' ')?;
+    scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim_start_matches(' '))
 }
 
 /// Makes room for one more of those that are `alike`, where there are so many already.
@@ -397,6 +403,8 @@ mod tests {
             let secret = credentials.secret(wanted).as_str().to_owned();
             assert_eq!(access(&credentials, &format!("/ws?a=b&token={secret}"), &[]), Some(wanted));
             let bearer = format!("Bearer {secret}");
+            assert_eq!(access(&credentials, "/ws", &[("authorization", &bearer)]), Some(wanted));
+            let bearer = format!("bearer  {secret}");
             assert_eq!(access(&credentials, "/ws", &[("authorization", &bearer)]), Some(wanted));
             let id = credentials.begin(wanted).expect("a session");
             let cookie = format!("other=1; tombolo-7070={}", id.as_str());

@@ -18,6 +18,20 @@ use super::{
 };
 use crate::lock::lock;
 
+/// What stands before the path of the file of links where a run, or a recording, tells it.
+const ARE_IN: [&str; 4] = [
+    "the links to this run are in ",
+    "the links to this recording are in ",
+    "links for others, and to watch only, are in ",
+    "links for others are in ",
+];
+
+/// The path of the file of links that a line of a program's output tells.
+pub(crate) fn told_in(line: &str) -> Option<&str> {
+    let told = ARE_IN.iter().find_map(|words| Some(line.split_once(words)?.1.trim_end()));
+    told.filter(|path| !path.is_empty())
+}
+
 /// A file with links, which goes with the server that they lead to.
 pub(super) struct LinkFile(PathBuf);
 
@@ -65,6 +79,8 @@ pub(super) struct Links {
     /// The relay that it connects to, which its links lead through.
     pub(super) relay: Option<Arc<Connect>>,
     pub(super) file: Mutex<Option<LinkFile>>,
+    /// Whether they lead to a recording, which nobody drives.
+    pub(super) is_of_recording: bool,
 }
 
 /// Where a link leads, but for its secret.
@@ -83,10 +99,11 @@ impl Links {
         self.way().link("token", self.credentials.secret(access).as_str())
     }
 
-    /// A link that opens one browser, once, for driving; `None` where the system has no random
-    /// numbers.
+    /// A link that opens one browser, once, for driving what can be driven; `None` where the system has
+    /// no random numbers.
     pub(super) fn browser_link(&self) -> Option<String> {
-        let key = self.credentials.key(Access::Drive, None).ok()?;
+        let access = if self.is_of_recording { Access::Watch } else { Access::Drive };
+        let key = self.credentials.key(access, None).ok()?;
         Some(self.way().link("key", key.as_str()))
     }
 
@@ -122,7 +139,8 @@ impl Links {
         };
         let mut lines = String::new();
         for way in std::iter::once(self.way()).chain(local) {
-            for (name, access) in [("drive", Access::Drive), ("watch", Access::Watch)] {
+            let driven = (!self.is_of_recording).then_some(("drive", Access::Drive));
+            for (name, access) in driven.into_iter().chain([("watch", Access::Watch)]) {
                 let secret = self.credentials.secret(access);
                 lines += &format!("{name}: {}\n", way.link("token", secret.as_str()));
             }
@@ -154,11 +172,15 @@ impl Links {
         let certificate = self.fingerprint.as_ref().map_or_else(String::new, |fingerprint| {
             format!("\nits certificate has the SHA-256 fingerprint {}", with_colons(fingerprint))
         });
+        let (opens, leads) = match self.is_of_recording {
+            true => ("links for others are in", "the links to this recording are in"),
+            false => {
+                ("links for others, and to watch only, are in", "the links to this run are in")
+            }
+        };
         let invitation = match self.browser_link().filter(|_| terminal) {
-            Some(link) => format!(
-                "open {link}\nIt opens one browser, once; links for others, and to watch only, are in {path}"
-            ),
-            None => format!("the links to this run are in {path}"),
+            Some(link) => format!("open {link}\nIt opens one browser, once; {opens} {path}"),
+            None => format!("{leads} {path}"),
         };
         let waits = match &self.relay {
             Some(relay) if !relay.is_connected() => {

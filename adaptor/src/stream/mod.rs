@@ -70,6 +70,7 @@ use tombolo_pipelines::language::{JournalNote, Listen, Message, StreamLimits, St
 use crate::lock::lock;
 
 pub(crate) use hub::{Clock, End, Hub};
+pub(crate) use links::told_in;
 pub(crate) use observer::{Observed, Observer};
 pub(crate) use pace::{COARSER, EXACT, LEVELS};
 pub(crate) use surface::ReferenceSurface;
@@ -270,6 +271,7 @@ impl Server {
             credentials,
             relay: relay.clone(),
             file: Mutex::default(),
+            is_of_recording: shared.playback.is_some(),
         });
         let ways = Ways { socket, acceptor, relay, links: Arc::clone(&links) };
         let (stop, stopped) = oneshot::channel();

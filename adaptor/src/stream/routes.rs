@@ -6,6 +6,7 @@ use axum::{
     Extension, Router,
     extract::{
         ConnectInfo, Query, Request, State, WebSocketUpgrade,
+        rejection::QueryRejection,
         ws::{CloseFrame, Message as Wire, rejection::WebSocketUpgradeRejection},
     },
     http::{HeaderName, Method, StatusCode, Uri, header},
@@ -116,8 +117,12 @@ struct Wanted {
 /// The edits that make the shape, from one on: as many as go into one answer.
 async fn stack_of_edits(
     State(shared): State<Shared>,
-    Query(Wanted { from, revision }): Query<Wanted>,
+    wanted: Result<Query<Wanted>, QueryRejection>,
 ) -> Response {
+    let Ok(Query(Wanted { from, revision })) = wanted else {
+        let expected = "from, revision: expected whole numbers, 0 or more\n";
+        return (StatusCode::BAD_REQUEST, expected).into_response();
+    };
     // Elsewhere: the others are served while it is written out.
     let written = move || {
         let answer = match &shared.playback {
@@ -151,7 +156,7 @@ async fn schema_of_order() -> Response {
 }
 
 async fn file(State(shared): State<Shared>, uri: Uri, request: Request) -> Response {
-    if request.method() != Method::GET {
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return StatusCode::METHOD_NOT_ALLOWED.into_response();
     }
     match shared.files.answer(uri.path(), request.headers()) {

@@ -206,9 +206,7 @@ fn receive(
             "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel",
             NOT_DRIVEN,
         ),
-        Access::Watch => {
-            ("this viewer watches: the secret or link that it came with is for watching", WATCHED)
-        }
+        Access::Watch => ("the secret or link that this viewer came with is for watching", WATCHED),
     };
     // A viewer that watches can send a `drive` or a note; a longer message is not worth reading.
     if !drives && text.len() > most {

@@ -1,13 +1,17 @@
 //! `tombolo doctor`.
 
+use std::time::Duration;
+
 use crate::client::{Client, ClientError, Link, Options};
 use serde_json::json;
 
-use super::{Target, read_link};
+use super::{Target, target::TargetError};
 use crate::program::{Failure, say};
 
 /// The steps, in their order.
 const STEPS: [&str; 5] = ["link", "name", "connection", "server", "token"];
+/// How long the first status is waited for, which comes right behind the greeting.
+const STATUS: Duration = Duration::from_secs(5);
 
 pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
     let tell = |step: &str, is_well: bool, found: &str, advice: Option<&str>| {
@@ -18,34 +22,53 @@ pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
         say(format_args!("{step}: {how}: {found}"))?;
         advice.map_or(Ok(()), |advice| say(format_args!("  {advice}")))
     };
-    let link = read_link(&target.link);
+    let link = match target.link() {
+        Ok(link) => link,
+        Err(error) => {
+            tell(STEPS[0], false, &error.to_string(), Some(advice_on_target(&error)))?;
+            return Err(Failure::Unreached);
+        }
+    };
     let options = Options { attempts: 0, ..Options::default() };
-    let connected = link.clone().and_then(|link| Client::connect(&link, &options));
+    let connected = Client::connect(&link, &options);
     let wrong = connected.as_ref().err().map(|error| (step(error), error));
     for (number, name) in STEPS.iter().enumerate() {
         match wrong {
             Some((at, error)) if at == number => {
-                tell(name, false, &error.to_string(), Some(&advice(error, link.as_ref().ok())))?;
+                tell(name, false, &error.to_string(), Some(&advice(error, &link)))?;
                 return Err(Failure::Unreached);
             }
-            _ => {
-                let link = link.as_ref().ok();
-                let found = link.map_or_else(String::new, |link| well(number, link));
-                tell(name, true, &found, None)?;
-            }
+            _ => tell(name, true, &well(number, &link), None)?,
         }
     }
     let Ok(client) = connected else { return Err(Failure::Unreached) };
-    let name = client.hello().map_or_else(String::new, |hello| hello.client.clone());
-    let role =
-        if client.drives() { "it may steer" } else { "it watches, because another one drives" };
-    tell("viewer", true, &format!("the run takes this client as {name}; {role}"), None)
+    tell("viewer", true, &viewer(&client), None)
+}
+
+/// What the client may do that has connected.
+fn viewer(client: &Client) -> String {
+    let hello = client.hello();
+    if hello.as_ref().is_some_and(|hello| hello.recording.is_some()) {
+        return "this is a recording, of which nothing can be ordered".into();
+    }
+    let role = if client.drives() {
+        "it may steer".into()
+    } else if hello.as_ref().is_some_and(|hello| hello.may_drive == Some(false)) {
+        "it watches, because the link is for watching".into()
+    } else {
+        let status = client.wait_for_status(STATUS, |_| true).ok();
+        match status.as_ref().and_then(|status| status.driver.as_ref()) {
+            Some(driver) => format!("it watches, because {driver} drives"),
+            None => "it watches for now: the wheel is kept for a driver that was lost".into(),
+        }
+    };
+    let name = hello.map_or_else(String::new, |hello| hello.client.clone());
+    format!("the run takes this client as {name}; {role}")
 }
 
 /// The step at which a connection has failed.
 fn step(error: &ClientError) -> usize {
     match error {
-        ClientError::Link { .. } => 0,
         ClientError::Unknown { .. } => 1,
         ClientError::Refused { .. }
         | ClientError::Unreachable { .. }
@@ -68,13 +91,28 @@ fn well(step: usize, link: &Link) -> String {
     }
 }
 
-/// The advice for an error.
-fn advice(error: &ClientError, link: Option<&Link>) -> String {
-    let port = link.map_or(7070, Link::port);
+/// The advice where nothing leads to a run.
+fn advice_on_target(error: &TargetError) -> &'static str {
     match error {
-        ClientError::Link { .. } => {
-            "Copy the whole link that the run has printed, with its token, and put it in quotes.".into()
+        TargetError::Link(_) | TargetError::NoLink { .. } => {
+            "Give the file of links that the run's output names (tombolo-PORT.link), or a whole link from it, in quotes."
         }
+        TargetError::Gone { .. } | TargetError::Ended { .. } => {
+            "The run has ended, or the file is on another machine or in another folder. Look at the end of the run's output."
+        }
+        TargetError::Unreadable { .. } => {
+            "A file of links is its owner's alone: somebody else asks them for a link (`tombolo link`)."
+        }
+        TargetError::Open { .. } => {
+            "Where that file is right, give it itself; its owner can set it right by: chmod 600 FILE"
+        }
+    }
+}
+
+/// The advice for an error.
+fn advice(error: &ClientError, link: &Link) -> String {
+    let port = link.port();
+    match error {
         ClientError::Unknown { .. } => {
             "Look at the spelling of the host. A node of a cluster is often known inside it alone: go through an SSH tunnel then.".into()
         }
@@ -82,7 +120,7 @@ fn advice(error: &ClientError, link: Option<&Link>) -> String {
             "The run has ended, or it listens on another port, or the SSH tunnel is not open. A run on another machine that listens \
              on its loopback address is reached by: ssh -L {port}:127.0.0.1:{port} HOST"
         ),
-        ClientError::Unreachable { .. } if link.is_some_and(|link| link.socket_path().is_some()) => {
+        ClientError::Unreachable { .. } if link.socket_path().is_some() => {
             "The run has ended, or it is on another machine, or the socket belongs to another user: only its owner can connect.".into()
         }
         ClientError::Unreachable { .. } => format!(
@@ -91,6 +129,25 @@ fn advice(error: &ClientError, link: Option<&Link>) -> String {
         ClientError::Certificate { .. } => {
             "Another program may answer there, or the link is of an earlier run: take the link that this run has printed, with what \
              stands behind the #. Behind a proxy leave that away, and have the proxy's certificate trusted by this machine.".into()
+        }
+        ClientError::Encrypted { .. } => {
+            "Begin the link with https://. Better, take the run's own link: it names the run's certificate behind the #.".into()
+        }
+        ClientError::NotEncrypted { .. } => {
+            "Begin the link with http://, where this is a run on the loopback address or at the near end of a tunnel. Otherwise \
+             another program has the port: a token that is sent there can be read on the way.".into()
+        }
+        ClientError::HungUp { .. } => format!(
+            "The run has ended, and the tunnel to it is still open; or the tunnel ends at another port than that of the run, or at \
+             another machine. A tunnel is opened by: ssh -L {port}:127.0.0.1:{port} HOST"
+        ),
+        ClientError::NotAtRelay { .. } if link.is_bare() => {
+            "This link is that of the relay's page: open it in a browser, which lists the runs. A program takes the links in \
+             the run's own file.".into()
+        }
+        ClientError::NotAtRelay { .. } => {
+            "The run has ended, or has not come to the relay yet, or is connected to it under another name: the relay's page lists \
+             those that are. The run's output says why it does not reach the relay.".into()
         }
         ClientError::HostRefused { .. } => format!(
             "The run listens on its loopback address and answers to 127.0.0.1, localhost and [::1] only: open the link as \

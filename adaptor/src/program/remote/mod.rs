@@ -6,15 +6,18 @@ mod order;
 mod queue;
 mod status;
 mod steer;
+mod target;
 mod watch;
 
-use std::{io::Read, path::Path, time::Duration};
+use std::{ffi::OsString, path::Path, time::Duration};
 
-use crate::client::{Client, ClientError, Event, Link, LinkError, Options};
-use clap::{Args, Subcommand};
+use crate::client::{Client, ClientError, Event, Options};
+use clap::Subcommand;
 use serde_json::json;
 
 use crate::program::{Failure, say};
+
+pub(crate) use target::Target;
 
 pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done; 1 refused or failed; 2 wrong use, or no connection (`tombolo doctor LINK` says why).";
 
@@ -32,17 +35,6 @@ pub(crate) const ANSWER: Duration = Duration::from_secs(120);
 const WAIT: Duration = Duration::from_secs(3600);
 /// Said of an order that the run has taken and the solver has not come to.
 const NOT_YET: &str = "taken: it takes effect at the solver's next safe point";
-/// Bytes that are read of a file that holds a link.
-const LINK_FILE: u64 = 1 << 16;
-
-#[derive(Debug, Args)]
-pub(crate) struct Target {
-    /// The link that the run has printed, or a file that holds it
-    link: String,
-    /// Print one JSON object in each line: the messages of the protocol
-    #[arg(long)]
-    pub(crate) json: bool,
-}
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Task {
@@ -95,6 +87,26 @@ pub(crate) fn has(name: &str) -> bool {
     NAMES.contains(&name)
 }
 
+/// What is said where several files of links are given to one of these tasks, as a shell does for
+/// `*.link`; `arguments` begin with the name of the program.
+pub(crate) fn several(arguments: &[OsString]) -> Option<String> {
+    let (task, rest) = arguments.get(1..)?.split_first()?;
+    if !task.to_str().is_some_and(has) {
+        return None;
+    }
+    let is_file =
+        |path: &&Path| path.extension().is_some_and(|end| end == "link") && path.is_file();
+    let files: Vec<_> = rest.iter().map(Path::new).filter(is_file).map(Path::display).collect();
+    let names = files.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    (files.len() > 1).then(|| {
+        format!(
+            "found {} files of links ({names}), expected one; each run has its own, and one that was killed leaves it behind: \
+             `tombolo doctor FILE` says whether its run answers",
+            files.len()
+        )
+    })
+}
+
 pub(crate) fn run(task: &Task) -> Result<(), Failure> {
     let (done, as_json) = match task {
         Task::Status(target) => (status::status(target), target.json),
@@ -132,30 +144,8 @@ pub(crate) fn failed(error: ClientError) -> Failure {
     }
 }
 
-/// The link itself, or the first one in a file.
-fn read_link(text: &str) -> Result<Link, ClientError> {
-    if text.contains("://") || text.starts_with("unix:") || !Path::new(text).is_file() {
-        return Ok(text.parse()?);
-    }
-    let mut bytes = Vec::new();
-    let read = std::fs::File::open(text).and_then(|file| {
-        file.take(LINK_FILE).read_to_end(&mut bytes)?;
-        Ok(())
-    });
-    let wrong = |reason: String| LinkError { found: text.into(), reason };
-    read.map_err(|error| wrong(format!("the file cannot be read ({error})")))?;
-    let content = String::from_utf8_lossy(&bytes);
-    match content
-        .split_whitespace()
-        .find(|word| ["http://", "https://", "unix:"].iter().any(|begin| word.starts_with(begin)))
-    {
-        Some(link) => Ok(link.parse()?),
-        None => Err(wrong("the file holds none".into()).into()),
-    }
-}
-
 pub(crate) fn connect(target: &Target, watches: bool) -> Result<Client, Failure> {
-    let link = read_link(&target.link).map_err(failed)?;
+    let link = target.link().map_err(|error| Failure::NoConnection(error.to_string()))?;
     Client::connect(&link, &Options { watches, ..Options::default() }).map_err(failed)
 }
 

@@ -164,7 +164,8 @@ fn with_displacements(mut order: Order, client: &Client) -> Result<Order, Failur
 
 fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(), Failure> {
     let id = client.order(order).map_err(failed)?;
-    let bar = wait && !as_json && std::io::stderr().is_terminal();
+    let is_drawn = wait && !as_json && std::io::stderr().is_terminal();
+    let mut bar = is_drawn.then(|| Bar::new(std::io::stderr()));
     // The run first takes the order, and then has it take the place of another.
     let mut is_placed = order.replaces.is_none();
     let mut is_taken = false;
@@ -200,22 +201,23 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
         };
         is_taken = true;
         let has_ended = matches!(report.status, OrderStatus::Applied | OrderStatus::Rejected);
-        if as_json {
-            say(serde_json::json!({"order": report}))?;
-        } else if has_ended || !bar {
-            say(line(report))?;
-        } else {
-            draw(report);
+        if let Some(bar) = &mut bar {
+            bar.draw(report);
+        }
+        if has_ended {
+            // What is printed now stands below the bar.
+            drop(bar.take());
         }
         match report.status {
-            OrderStatus::Rejected => {
-                let reason = report.reason.clone().unwrap_or_else(|| "no reason given".into());
-                return Err(if as_json {
-                    Failure::Reported
-                } else {
-                    Failure::Wrong(format!("rejected: {reason}"))
-                });
-            }
+            _ if as_json => say(serde_json::json!({"order": report}))?,
+            // The failure tells it.
+            OrderStatus::Rejected => {}
+            _ if has_ended || !is_drawn => say(line(report))?,
+            _ => {}
+        }
+        match report.status {
+            OrderStatus::Rejected if as_json => return Err(Failure::Reported),
+            OrderStatus::Rejected => return Err(Failure::Wrong(line(report))),
             OrderStatus::Applied => return Ok(()),
             OrderStatus::Accepted if !is_placed => {}
             _ if !wait => return Ok(()),
@@ -259,16 +261,38 @@ pub(super) fn line(report: &OrderReport) -> String {
     line
 }
 
-/// Draws how many shapes were handed out, on a terminal.
-fn draw(report: &OrderReport) {
-    let (done, all) = (report.shape as usize, (report.shapes as usize).max(1));
-    let full = (BAR * done / all).min(BAR);
-    let bar = "#".repeat(full) + &".".repeat(BAR - full);
-    let end = if done == all { "\n" } else { "" };
-    let mut terminal = std::io::stderr();
-    // A bar that cannot be drawn is no reason to give up.
-    let _ = write!(terminal, "\r[{bar}] {done}/{} shapes{end}", report.shapes);
-    let _ = terminal.flush();
+/// A bar of the shapes that were handed out, which is drawn over and over in one line of a terminal.
+struct Bar<W: Write> {
+    terminal: W,
+    is_begun: bool,
+}
+
+impl<W: Write> Bar<W> {
+    fn new(terminal: W) -> Self {
+        Self { terminal, is_begun: false }
+    }
+
+    /// Draws how far an order is, from when it is known how many shapes there are.
+    fn draw(&mut self, report: &OrderReport) {
+        let (done, all) = (report.shape as usize, report.shapes as usize);
+        if all == 0 || report.status == OrderStatus::Rejected {
+            return;
+        }
+        self.is_begun = true;
+        let full = (BAR * done / all).min(BAR);
+        let bar = "#".repeat(full) + &".".repeat(BAR - full);
+        // A bar that cannot be drawn is no reason to give up.
+        let _ = write!(self.terminal, "\r[{bar}] {done}/{all} shapes");
+        let _ = self.terminal.flush();
+    }
+}
+
+impl<W: Write> Drop for Bar<W> {
+    fn drop(&mut self) {
+        if self.is_begun {
+            let _ = writeln!(self.terminal);
+        }
+    }
 }
 
 fn print(forecast: &Foretold) -> Result<(), Failure> {
@@ -302,4 +326,30 @@ fn print(forecast: &Foretold) -> Result<(), Failure> {
         ))?;
     }
     say(format_args!("{} shape(s)", order.shapes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bar_begins_with_a_known_count_and_ends_its_line() {
+        let drawn = |reports: &[(OrderStatus, u32, u32)]| {
+            let mut terminal = Vec::new();
+            let mut bar = Bar::new(&mut terminal);
+            for &(status, shape, shapes) in reports {
+                bar.draw(&OrderReport { status, shape, shapes, ..OrderReport::default() });
+            }
+            drop(bar);
+            String::from_utf8(terminal).expect("a text")
+        };
+        let (computing, applying) = (OrderStatus::Computing, OrderStatus::Applying);
+        assert_eq!(drawn(&[(computing, 0, 0), (OrderStatus::Rejected, 0, 4)]), "");
+        let text = drawn(&[(computing, 0, 0), (applying, 1, 2), (OrderStatus::Applied, 2, 2)]);
+        let (half, rest) = ("#".repeat(BAR / 2), ".".repeat(BAR / 2));
+        let whole = "#".repeat(BAR);
+        assert_eq!(text, format!("\r[{half}{rest}] 1/2 shapes\r[{whole}] 2/2 shapes\n"));
+        let left = drawn(&[(applying, 1, 2)]);
+        assert!(left.ends_with(" 1/2 shapes\n"), "{left:?}");
+    }
 }

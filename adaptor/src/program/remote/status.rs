@@ -1,6 +1,6 @@
 //! `tombolo status`.
 
-use crate::client::{Event, Hello, Status};
+use crate::client::{Client, Event, Hello, Status};
 
 use super::{ANSWER, Target, connect, failed};
 use crate::program::{Failure, say};
@@ -14,7 +14,7 @@ pub(crate) fn status(target: &Target) -> Result<(), Failure> {
         match told.event {
             Event::Status(_) if target.json => return say(&told.text),
             Event::Status(status) => {
-                say(line(&status))?;
+                say(line(&status, is_recording(&client)))?;
                 return client.hello().map_or(Ok(()), |hello| describe(&hello));
             }
             _ => {}
@@ -22,14 +22,20 @@ pub(crate) fn status(target: &Target) -> Result<(), Failure> {
     }
 }
 
-/// How far the solver is, in one line.
-pub(super) fn line(status: &Status) -> String {
-    let how = match (status.stopped, status.paused) {
-        (true, _) => "stopping",
-        (_, true) => "paused",
+/// Whether a recording is shown, and no run.
+pub(super) fn is_recording(client: &Client) -> bool {
+    client.hello().is_some_and(|hello| hello.recording.is_some())
+}
+
+/// How far the solver is, in one line; or how far a recording is shown, with what was told then.
+pub(super) fn line(status: &Status, is_recording: bool) -> String {
+    let how = match (is_recording, status.stopped, status.paused) {
+        (true, ..) => "recording",
+        (_, true, _) => "stopping",
+        (_, _, true) => "paused",
         _ => "running",
     };
-    let mut line = format!("{how}: cycle {}, time {}", status.cycle, status.time);
+    let mut line = format!("{how}: cycle {}, time {}", status.cycle, rounded(status.time));
     if let Some(seconds) = status.step_seconds {
         line += &format!(", {seconds:.3} s a step");
     }
@@ -39,8 +45,18 @@ pub(super) fn line(status: &Status) -> String {
             quality.min, quality.mean, quality.inverted
         );
     }
+    if is_recording {
+        return line;
+    }
     let driver = status.driver.as_deref().unwrap_or("nobody");
-    line + &format!(", {} viewer(s), {driver} drives", status.viewers)
+    // The one that asks is one of them.
+    let others = status.viewers.saturating_sub(1);
+    line + &format!(", {others} other viewer(s), {driver} drives")
+}
+
+/// A time in so many digits as are not those of adding up steps.
+pub(super) fn rounded(time: f64) -> f64 {
+    format!("{time:.11e}").parse().unwrap_or(time)
 }
 
 fn describe(hello: &Hello) -> Result<(), Failure> {
@@ -52,4 +68,23 @@ fn describe(hello: &Hello) -> Result<(), Failure> {
         say(super::order::line(order))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_counts_the_others_and_shows_no_digits_of_rounding() {
+        let told = r#"{"cycle": 7, "time": 16.134000000001937, "viewers": 3, "driver": "c2"}"#;
+        let status: Status = serde_json::from_str(told).expect("a status");
+        assert_eq!(
+            line(&status, false),
+            "running: cycle 7, time 16.134, 2 other viewer(s), c2 drives"
+        );
+        assert_eq!(line(&status, true), "recording: cycle 7, time 16.134");
+        for time in [0.0, -1.5e-9, 1e300, f64::NAN] {
+            assert_eq!(rounded(time).to_bits(), time.to_bits());
+        }
+    }
 }

@@ -44,7 +44,7 @@ pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
                 _ if told.text.is_empty() => {}
                 _ => say(&told.text)?,
             }
-        } else if let Some(line) = line(&told.event) {
+        } else if let Some(line) = line(&told.event, status::is_recording(&client)) {
             say(line)?;
         }
     }
@@ -56,9 +56,9 @@ pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
 }
 
 /// The line that is printed for an event.
-fn line(event: &Event) -> Option<String> {
+fn line(event: &Event, is_recording: bool) -> Option<String> {
     Some(match event {
-        Event::Status(status) => status::line(status),
+        Event::Status(status) => status::line(status, is_recording),
         Event::Order(report) => order::line(report),
         Event::Monitor(values) => {
             let number = |value: &Option<f64>| match value {
@@ -68,7 +68,8 @@ fn line(event: &Event) -> Option<String> {
             let each =
                 values.values.iter().map(|(name, value)| format!("{name} {}", number(value)));
             let all = each.collect::<Vec<_>>().join(", ");
-            format!("{}: cycle {}, time {}: {all}", values.pipeline, values.cycle, values.time)
+            let time = status::rounded(values.time);
+            format!("{}: cycle {}, time {time}: {all}", values.pipeline, values.cycle)
         }
         Event::Pipelines(change) => match change.cycle {
             Some(cycle) => format!("pipelines: {} at cycle {cycle}", change.status),
@@ -81,7 +82,9 @@ fn line(event: &Event) -> Option<String> {
         Event::Precision(precision) => format!("{}: as exact as it asks for", precision.view),
         Event::Error(error) => format!("error: {}", error.message),
         Event::Lost { reason } => format!("connection lost: {reason}"),
-        Event::End(end) => format!("{}: cycle {}, time {}", end.how, end.cycle, end.time),
+        Event::End(end) => {
+            format!("{}: cycle {}, time {}", end.how, end.cycle, status::rounded(end.time))
+        }
         _ => return None,
     })
 }

@@ -27,6 +27,9 @@ use crate::stream::{connection::Connection, credentials::Access, relay_messages:
 
 /// How long a run may take to answer. The first request for a surface has it encoded.
 const ANSWER: Duration = Duration::from_secs(120);
+/// Said of a run that is not connected, and of one that does not answer: programs know a relay by them.
+pub(crate) const NOT_CONNECTED: &str = "no run of this name is connected to this relay\n";
+pub(crate) const SILENT_RUN: &str = "the run does not answer the relay\n";
 /// Headers that belong to one connection, and not to what goes through it.
 const OF_CONNECTION: [HeaderName; 8] = [
     header::CONNECTION,
@@ -52,7 +55,7 @@ pub(super) async fn forward(
     }
     let (name, rest) = named(request.uri());
     let Some(run) = relay.runs.find(name) else {
-        return said(StatusCode::NOT_FOUND, "no run of this name is connected to this relay\n");
+        return said(StatusCode::NOT_FOUND, NOT_CONNECTED);
     };
     let Some(rest) = rest else {
         let query = request.uri().query().map_or_else(String::new, |query| format!("?{query}"));
@@ -72,7 +75,7 @@ pub(super) async fn forward(
             );
         }
         Err(Unreached::NoAnswer) => {
-            return said(StatusCode::BAD_GATEWAY, "the run does not answer the relay\n");
+            return said(StatusCode::BAD_GATEWAY, SILENT_RUN);
         }
     };
     let request = passed_on(request, rest, &relay);

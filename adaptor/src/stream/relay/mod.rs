@@ -45,6 +45,7 @@ use super::{
     socket::Socket,
     tls::{Identity, names_of},
 };
+pub(crate) use forward::{NOT_CONNECTED, SILENT_RUN};
 use runs::{RUNS, Runs};
 
 /// The files of a relay's directory: the secret that runs name as `stream.secrets`, that of its page,
