@@ -94,7 +94,7 @@ fn well(step: usize, link: &Link) -> String {
 /// The advice where nothing leads to a run.
 fn advice_on_target(error: &TargetError) -> &'static str {
     match error {
-        TargetError::Link(_) | TargetError::NoLink { .. } => {
+        TargetError::Link(_) | TargetError::NoLink { .. } | TargetError::Folder { .. } => {
             "Give the file of links that the run's output names (tombolo-PORT.link), or a whole link from it, in quotes."
         }
         TargetError::Gone { .. } | TargetError::Ended { .. } => {

@@ -33,7 +33,7 @@ pub(crate) enum TargetError {
     #[error(transparent)]
     Link(#[from] LinkError),
     #[error(
-        "there is no file {}; a run takes its file of links away when it ends", path.display()
+        "there is no file {}, and it is no link; expected http://HOST:PORT/?token=TOKEN or a run's file of links, which goes when the run ends", path.display()
     )]
     Gone { path: PathBuf },
     #[error(
@@ -44,6 +44,8 @@ pub(crate) enum TargetError {
     Ended { log: PathBuf, path: PathBuf },
     #[error("the file {} cannot be read: {reason}", path.display())]
     Unreadable { path: PathBuf, reason: String },
+    #[error("{} is a folder, expected a link or a run's file of links", path.display())]
+    Folder { path: PathBuf },
     #[error("the file {} holds no link, and does not tell where the links are", path.display())]
     NoLink { path: PathBuf },
     #[error(
@@ -78,6 +80,9 @@ fn read_link(text: &str) -> Result<Link, TargetError> {
             Err(error) if is_address(text) => error.into(),
             _ => TargetError::Gone { path: log.into() },
         });
+    }
+    if log.is_dir() {
+        return Err(TargetError::Folder { path: log.into() });
     }
     let path = match find(log, open(log)?)? {
         Found::Link(link) => return Ok(link),
