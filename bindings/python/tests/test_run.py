@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from urllib.request import urlopen
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -406,23 +405,6 @@ def test_a_closed_run_and_a_fork_are_told(solver):
                 os._exit(7)
             os._exit(1)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-
-
-def test_a_run_shows_itself_in_a_notebook(run):
-    assert run.link.split("?")[0] in run._repr_html_()
-
-
-def test_a_monitor_is_plotted(run):
-    from tombolo.jupyter import Plot, _svg
-
-    run.wait_for(lambda: "health" in run.monitors and run.monitors["health"].rows > 5, 30)
-    root = ElementTree.fromstring(Plot(run, "health", "temperature.max")._repr_svg_())
-    (line,) = root.iter("{http://www.w3.org/2000/svg}polyline")
-    heights = [float(pair.split(",")[1]) for pair in line.get("points").split()]
-    assert len(heights) > 5 and heights == sorted(heights, reverse=True)
-    parted = ElementTree.fromstring(_svg("t", np.arange(5), np.array([1, 2, np.nan, 3, 4])))
-    assert len(list(parted.iter("{http://www.w3.org/2000/svg}polyline"))) == 2
-    assert "nothing measured" in _svg("t", np.arange(2), np.full(2, np.nan))
 
 
 def test_a_slow_reader_is_shown_the_newest_frame_and_not_each_one(begin):

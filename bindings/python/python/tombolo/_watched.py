@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import atexit
 import weakref
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Optional, TypeVar
@@ -22,8 +22,6 @@ Found = TypeVar("Found")
 #: How long a view that nobody knows may take to be announced, in seconds.
 _ANNOUNCED = 2.0
 
-_RUNS: weakref.WeakSet[Watched] = weakref.WeakSet()
-
 
 class Watched:
     """What a client does that only watches; a `Run` steers too."""
@@ -34,7 +32,8 @@ class Watched:
         self._state = State()
         self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
         self._callbacks = Callbacks(self._reader)
-        _RUNS.add(self)
+        # The thread that reads holds the reader: without this a run that nobody has any more would keep the wheel.
+        weakref.finalize(self, self._reader.abandon).atexit = False
         try:
             self.wait_for(lambda: bool(self._state.hello), 20.0)
         except BaseException:
@@ -231,20 +230,25 @@ class Watched:
         WaitError
             None came in time.
         """
-        return iterate(self._reader, self._reader.listen(), kinds, timeout)
+        return self._iterate(self._reader.listen(), kinds, timeout)
+
+    def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
+        # A generator of the run's own, which holds the run as long as somebody iterates.
+        yield from iterate(self._reader, waiting, kinds, timeout)
 
     def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
         """Have a function called with each event of a kind, or with every one where `kind` is None.
 
         It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
-        printed, and it is called again.
+        printed, and it is called again. While there is such a function, the run stays connected until it is closed,
+        though nothing else refers to it.
 
         Returns
         -------
         callable
             Call it to have the function called no more.
         """
-        return self._callbacks.add(kind, callback)
+        return self._callbacks.add(self, kind, callback)
 
     # ---- The end.
 
@@ -259,10 +263,3 @@ class Watched:
             return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
         cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
         return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
-
-
-@atexit.register
-def _close_all() -> None:
-    # A thread that reads must not outlive the interpreter.
-    for run in list(_RUNS):
-        run.close()

@@ -15,7 +15,6 @@ from .run import _text
 
 if TYPE_CHECKING:
     from . import _native
-    from ._reader import Reader
     from .events import Event
     from .run import Run
     from .state import Status
@@ -68,9 +67,9 @@ class AsyncOrder:
 class _Events(AsyncIterator["Event"]):
     """What a run tells. No generator, which the cancellation of one wait for an event would end for good."""
 
-    def __init__(self, reader: Reader, kinds: tuple[str, ...]) -> None:
-        self._reader, self._kinds = reader, kinds
-        self._waiting: deque[Event] = reader.listen()
+    def __init__(self, run: Run, kinds: tuple[str, ...]) -> None:
+        self._run, self._reader, self._kinds = run, run._reader, kinds
+        self._waiting: deque[Event] = self._reader.listen()
         self._is_over = False
 
     async def __anext__(self) -> Event:
@@ -220,7 +219,7 @@ class AsyncRun:
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
         """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
-        return _Events(self.run._reader, kinds)
+        return _Events(self.run, kinds)
 
     async def close(self) -> None:
         """As `Run.close`."""

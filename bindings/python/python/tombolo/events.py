@@ -13,6 +13,7 @@ from .errors import CallError, WaitError
 
 if TYPE_CHECKING:
     from ._reader import Reader
+    from ._watched import Watched
 
 __all__ = ["Event"]
 
@@ -61,15 +62,18 @@ class Callbacks:
     def __init__(self, reader: Reader) -> None:
         self._reader = reader
         self._lock = threading.Lock()
+        # While there are functions: what they are called with comes no more once the run is let go of.
+        self._run: Optional[Watched] = None
         self._functions: list[tuple[Optional[str], Callable[[Event], object]]] = []
         self._thread: Optional[threading.Thread] = None
 
-    def add(self, kind: Optional[str], function: Callable[[Event], object]) -> Callable[[], None]:
-        """Have a function called with events of a kind, or with all; returns what ends that."""
+    def add(self, run: Watched, kind: Optional[str], function: Callable[[Event], object]) -> Callable[[], None]:
+        """Have a function called with events of a run of a kind, or with all; returns what ends that."""
         entry = (kind, function)
         self._reader.check()
         with self._lock:
             self._functions.append(entry)
+            self._run = run
             if self._thread is None:
                 waiting = self._reader.listen()
                 self._thread = threading.Thread(target=self._call, args=(waiting,), name="tombolo-calls", daemon=True)
@@ -79,17 +83,23 @@ class Callbacks:
             with self._lock:
                 if entry in self._functions:
                     self._functions.remove(entry)
+                if not self._functions:
+                    self._run = None
 
         return remove
 
     def _call(self, waiting: deque[Event]) -> None:
+        for event in iterate(self._reader, waiting, ()):
+            self._call_each(event)
+
+    def _call_each(self, event: Event) -> None:
+        # No loop of the thread's own: a function that was removed may be the last that refers to its run.
         import traceback
 
-        for event in iterate(self._reader, waiting, ()):
-            with self._lock:
-                chosen = [function for kind, function in self._functions if kind in (None, event.kind)]
-            for function in chosen:
-                try:
-                    function(event)
-                except Exception:
-                    traceback.print_exc()
+        with self._lock:
+            chosen = [function for kind, function in self._functions if kind in (None, event.kind)]
+        for function in chosen:
+            try:
+                function(event)
+            except Exception:
+                traceback.print_exc()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 from . import _json
 from ._waiting import in_thread
 from ._watched import Watched
-from .errors import LinkError, NotDriverError, RejectedError
+from .errors import LinkError, NotDriverError, RejectedError, WaitError
 from .orders import Command, Edits, Forecast, Order
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ __all__ = ["Run", "connect"]
 _WHEEL = 8.0
 #: How long it is asked for at once.
 _SLICE = 0.2
+#: How long one who has left may still be told as the driver.
+_LEAVING = 1.0
 #: How links begin.
 _SCHEMES = ("http://", "https://", "unix:")
 
@@ -32,7 +34,8 @@ class Run(Watched):
 
     A thread of its own reads what the run tells, so that `status`, `views` and `monitors` are always the newest. A
     connection that is lost is made again with growing pauses. Any thread may use it. Every wait ends with Ctrl-C. It
-    closes with `close`, at the end of a `with` block, or with the interpreter; the run itself goes on.
+    closes with `close`, at the end of a `with` block, once nothing refers to it any more, or with the interpreter; the
+    run itself goes on.
 
     Attributes
     ----------
@@ -74,10 +77,20 @@ class Run(Watched):
         try:
             in_thread(lambda: self._reader.client.drive(_SLICE))
         except NotDriverError:
-            taken = self._state.status is not None and self._state.status.driver is not None
-            if taken or clock.monotonic() >= until:
+            if self._is_taken(until) or clock.monotonic() >= until:
                 raise
         return self.drives
+
+    def _is_taken(self, until: float) -> bool:
+        """Whether somebody else steers, and still does after a moment: of one who has just left it is told late."""
+
+        def is_free() -> bool:
+            return self.drives or self._state.status is None or self._state.status.driver is None
+
+        try:
+            return not self.wait_for(is_free, max(min(_LEAVING, until - clock.monotonic()), 0.0))
+        except WaitError:
+            return True
 
     def order(
         self,

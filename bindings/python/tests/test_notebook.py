@@ -1,0 +1,83 @@
+"""A run in a notebook: its cells are run again, and what they return is shown."""
+
+import gc
+from xml.etree import ElementTree
+
+import numpy as np
+import tombolo
+from conftest import wait
+from tombolo.jupyter import Plot, _svg
+
+
+def steers(link):
+    """Whether one who connects now can steer."""
+    with tombolo.connect(link) as other:
+        try:
+            other.drive(0.5)
+        except tombolo.NotDriverError:
+            return False
+        return True
+
+
+def test_a_cell_that_is_run_again_has_the_wheel_again(solver):
+    run = tombolo.connect(solver.link)
+    run.set("heating", 2, timeout=30)
+    run = tombolo.connect(solver.link)
+    gc.collect()
+    run.set("heating", 3, timeout=30)
+    wait(lambda: run.status.viewers == 1)
+    run.close()
+
+
+def test_a_run_that_only_a_function_or_an_iterator_refers_to_stays(solver):
+    def connect():
+        run = tombolo.connect(solver.link)
+        run.drive()
+        return run
+
+    called = []
+    remove = connect().on("monitor", called.append)
+    gc.collect()
+    count = len(called)
+    wait(lambda: len(called) > count + 20)
+    assert not steers(solver.link)
+    remove()
+    gc.collect()
+    assert wait(lambda: steers(solver.link), 10)
+
+    events = connect().events("monitor", timeout=30)
+    gc.collect()
+    first = next(events).data["cycle"]
+    assert next(events).data["cycle"] == first + 1 and not steers(solver.link)
+    del events
+    gc.collect()
+    assert wait(lambda: steers(solver.link), 10)
+
+
+def test_a_run_that_its_own_function_refers_to_goes_with_it(solver):
+    def watch():
+        run = tombolo.connect(solver.link)
+        run.drive()
+        called = []
+        remove = run.on(None, lambda event: called.append(run.status.cycle))
+        wait(lambda: called)
+        return remove
+
+    watch()()
+    gc.collect()
+    assert wait(lambda: steers(solver.link), 10)
+
+
+def test_a_run_shows_itself_in_a_notebook(run):
+    assert run.link.split("?")[0] in run._repr_html_()
+
+
+def test_a_monitor_is_plotted(run):
+    run.wait_for(lambda: "health" in run.monitors and run.monitors["health"].rows > 5, 30)
+    root = ElementTree.fromstring(Plot(run, "health", "temperature.max")._repr_svg_())
+    (line,) = root.iter("{http://www.w3.org/2000/svg}polyline")
+    heights = [float(pair.split(",")[1]) for pair in line.get("points").split()]
+    assert len(heights) > 5 and heights == sorted(heights, reverse=True)
+    parted = ElementTree.fromstring(_svg("t", np.arange(5), np.array([1, 2, np.nan, 3, 4])))
+    assert len(list(parted.iter("{http://www.w3.org/2000/svg}polyline"))) == 2
+    assert "nothing measured" in _svg("t", np.arange(2), np.full(2, np.nan))
