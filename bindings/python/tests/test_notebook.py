@@ -1,12 +1,14 @@
 """A run in a notebook: its cells are run again, and what they return is shown."""
 
 import gc
+import re
+from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
 import tombolo
 from conftest import wait
-from tombolo.jupyter import Plot, _svg
+from tombolo.jupyter import Plot, _svg, viewer
 
 
 def steers(link):
@@ -68,8 +70,44 @@ def test_a_run_that_its_own_function_refers_to_goes_with_it(solver):
     assert wait(lambda: steers(solver.link), 10)
 
 
-def test_a_run_shows_itself_in_a_notebook(run):
-    assert run.link.split("?")[0] in run._repr_html_()
+class Page(HTMLParser):
+    """What is seen of a page, and what its elements say."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.seen, self.elements = "", {}
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        self.elements[tag] = dict(attributes)
+
+    def handle_data(self, text):
+        self.seen += f"{text} "
+
+
+def test_a_run_shows_itself_in_a_notebook(solver, run):
+    run.wait_for(lambda: run.monitors.get("health") and run.monitors["health"].rows and run.status.cycle > 5, 30)
+    page = Page(run._repr_html_())
+    # No browser shows the viewer in a frame of a notebook.
+    assert not {"iframe", "script", "object", "embed"} & set(page.elements)
+    assert page.elements["a"]["href"] == solver.link
+    assert page.elements["a"]["target"] == "_blank" and "noopener" in page.elements["a"]["rel"].split()
+    place, secret = solver.link.split("?token=")
+    assert place in page.seen and secret[:32] not in page.seen
+    assert " running" in page.seen and re.search(r" cycle +[1-9]", page.seen)
+    assert re.search(r" health +.*temperature\.max [0-9.]+,", page.seen)
+    run.pause(timeout=30)
+    run.wait_for(lambda: run.status.paused, 30)
+    assert "paused, steered from here" in run._repr_html_()
+    run.stop(timeout=30)
+    assert run.wait(30)["how"] == "stopped" and " stopped " in Page(run._repr_html_()).seen
+
+
+def test_a_link_in_a_notebook_is_nothing_but_a_link():
+    assert Page(viewer('http://127.0.0.1:1/?token=a"><b>')).elements.keys() == {"a"}
+    for link in ("unix:/run/user/tombolo.sock?token=secret", "javascript:alert(1)"):
+        page = Page(viewer(link))
+        assert not page.elements and "no browser" in page.seen and "secret" not in page.seen
 
 
 def test_a_monitor_is_plotted(run):

@@ -259,9 +259,9 @@ class Run(Watched):
         return Plot(self, pipeline, monitor)
 
     def _repr_html_(self) -> str:
-        from .jupyter import viewer
+        from .jupyter import summary
 
-        return viewer(self.link)
+        return summary(self)
 
 
 def _text(
