@@ -62,8 +62,6 @@ def test_views_are_arrays(run):
     np.testing.assert_allclose(later.fields["temperature"], heights, rtol=1e-4, atol=1e-4)
     assert later.associations == {"temperature": "vertex", "material": "element"}
     assert len(later.fields["material"]) == len(later.triangles) + len(later.lines)
-    with pytest.raises(KeyError, match="midplane"):
-        run.wait_for_view("midplan", timeout=5)
 
 
 def test_views_for_others(run):
@@ -79,7 +77,7 @@ def test_views_for_others(run):
 
 
 def test_monitors_grow(run):
-    table = run.wait_for(lambda: run.monitors.get("health"), 30)
+    table = run.monitors["health"]
     run.wait_for(lambda: table.rows >= 5, 30)
     before = table["cycle"]
     copy = before.copy()
@@ -91,8 +89,6 @@ def test_monitors_grow(run):
     pandas = pytest.importorskip("pandas")
     frame = run.monitors.to_pandas()
     assert isinstance(frame, pandas.DataFrame) and "health.quality.min" in frame.columns
-    with pytest.raises(KeyError, match="quality"):
-        table["qality"]
 
 
 def test_an_order_is_given_forecast_and_taken_back(solver, run):

@@ -9,13 +9,14 @@ from types import MappingProxyType
 from typing import Any, Optional, TypeVar
 
 from . import _json, _native
+from ._names import unknown
 from ._reader import Reader
 from ._waiting import in_thread
 from .errors import EndedError, WaitError
 from .events import Callbacks, Event, iterate
 from .monitors import Monitors
 from .state import Parameter, State, Status
-from .views import Surface, View
+from .views import Surface, View, Views
 
 Found = TypeVar("Found")
 
@@ -59,7 +60,7 @@ class Watched:
     @property
     def views(self) -> Mapping[str, View]:
         """The newest frame of each live view that has come."""
-        return MappingProxyType(self._state.views)
+        return Views(self._state.views, lambda: self.view_names)
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -198,7 +199,7 @@ class Watched:
         try:
             self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
         except WaitError:
-            raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
+            raise KeyError(unknown("view", name, self.view_names)) from None
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""

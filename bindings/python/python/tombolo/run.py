@@ -41,7 +41,7 @@ class Run(Watched):
     ----------
     link : str
         The link that it was connected by: whoever has it can do what it is for.
-    views : mapping of str to View
+    views : Views
         The newest frame of each live view that has come.
     monitors : Monitors
         For each pipeline that has monitors a table that grows.
