@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json
 from .errors import CallError, WaitError
+from .events import check_kinds
 from .orders import Command, Edits, Forecast, Order
 from .run import _text
 
@@ -219,6 +220,7 @@ class AsyncRun:
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
         """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
+        check_kinds(kinds)
         return _Events(self.run, kinds)
 
     async def close(self) -> None:

@@ -5,17 +5,23 @@ from __future__ import annotations
 import threading
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
+from ._names import unknown
 from ._waiting import moment_after
-from .errors import CallError, WaitError
+from .errors import CallError, ConfigurationError, WaitError
 
 if TYPE_CHECKING:
     from ._reader import Reader
     from ._watched import Watched
 
 __all__ = ["Event"]
+
+_KINDS = (
+    *("hello", "status", "order", "stack", "monitor", "forecast", "pipelines", "done", "people", "camera", "wheel"),
+    *("followed", "note", "note_removed", "link", "play", "precision", "error", "end", "frame", "lost", "ended"),
+)
 
 
 class Event(NamedTuple):
@@ -24,15 +30,23 @@ class Event(NamedTuple):
     Attributes
     ----------
     kind : str
-        `hello`, `status`, `order`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `note`,
-        `note_removed`, `error`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes
-        behind it) or the name of a message that this version does not know.
+        `hello`, `status`, `order`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `camera`, `wheel`
+        (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`, `error`, `end`,
+        `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes behind it), or the name of
+        a message that this version does not know, which comes where all kinds are asked for.
     data : dict, View or str
         The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
     """
 
     kind: str
     data: Any
+
+
+def check_kinds(kinds: Iterable[object]) -> None:
+    """An error where there are no events of a kind, for which nobody should wait."""
+    for kind in kinds:
+        if kind not in _KINDS:
+            raise ConfigurationError(unknown("event", kind, _KINDS))
 
 
 def iterate(
@@ -101,5 +115,6 @@ class Callbacks:
         for function in chosen:
             try:
                 function(event)
-            except Exception:
+            except BaseException:
+                # An exit would end this thread alone, and be told nowhere.
                 traceback.print_exc()
