@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import tombolo
 from conftest import SQUEEZE, Relay, wait
-from tombolo.state import State
 
 
 def test_what_a_feature_is_to_the_flow(begin):
@@ -164,11 +163,12 @@ def test_commands_take_effect(solver, run):
     run.wait_for_cycle(command.cycle + 2, 30)
     assert solver.heating[-1] == 3 and run.parameters["heating"].value == 3
     run.pause(timeout=30)
-    run.wait_for(lambda: run.status.paused, 30)
+    assert run.status.paused
     cycle = len(solver.heating)
     time.sleep(0.1)
     assert len(solver.heating) <= cycle + 1
     run.resume(timeout=30)
+    assert not run.status.paused
     run.wait_for_cycle(run.status.cycle + 2, 30)
     with pytest.raises(tombolo.RejectedError, match="from 0 to 10"):
         run.set("heating", 30, timeout=30)
@@ -187,51 +187,19 @@ def test_pipelines_change_while_it_runs(run):
         run.change_pipelines({"set": [{"nme": "x"}]})
 
 
-def test_events_are_iterated_and_called_with(run, capfd):
-    seen, called, others = set(), [], []
-    run.on("monitor", lambda event: 1 / 0)
-    remove = run.on("monitor", called.append)
-    run.on(None, others.append)
-    for event in run.events("monitor", "frame", timeout=30):
-        seen.add(event.kind)
-        if seen == {"monitor", "frame"}:
-            break
-    run.wait_for(lambda: len(called) > 2 and {"monitor", "frame", "status"} <= {event.kind for event in others}, 30)
-    assert {event.kind for event in called} == {"monitor"}
-    assert "ZeroDivisionError" in capfd.readouterr().err
-    remove()
-    count = len(others)
-    run.wait_for(lambda: len(others) > count + 10, 30)
-    # One call may have been under way.
-    count, end = len(called), len(others)
-    run.wait_for(lambda: len(others) > end + 30, 30)
-    assert len(called) == count
-    with pytest.raises(tombolo.WaitError):
-        next(run.events("lost", timeout=0.3))
-
-
-def test_the_end_ends_every_wait(solver, run):
-    waits = []
-
-    def wait():
-        try:
-            run.wait_for(lambda: False)
-        except tombolo.EndedError as error:
-            waits.append(str(error))
-
-    thread = threading.Thread(target=wait)
-    thread.start()
-    run.wait_for_cycle(2, 30)
-    run.stop(timeout=30)
-    thread.join(30)
-    solver.thread.join(30)
-    assert run.wait(30)["how"] == "stopped" and solver.stopped
-    assert waits and "the run has ended" in waits[0]
-    assert [event.kind for event in run.events()] == ["ended"]
-    assert list(run.events("monitor")) == []
-    with pytest.raises(tombolo.TomboloError):
-        run.pause(timeout=30)
-    assert run.monitors["health"].rows
+def test_a_run_that_is_lost_for_good_is_not_steered(solver):
+    relay = Relay(solver.link)
+    with tombolo.connect(relay.link, attempts=1) as run:
+        run.drive()
+        assert run.drives and "driving" in repr(run)
+        relay.refuses = True
+        relay.cut()
+        with pytest.raises(tombolo.LinkError):
+            run.wait_for(lambda: False, 30)
+        assert not run.drives and repr(run).endswith("not connected>")
+        with pytest.raises(tombolo.LinkError):
+            run.drive()
+    relay.server.close()
 
 
 def test_one_drives_and_others_watch(solver, run):
@@ -329,19 +297,6 @@ def test_a_link_is_found_in_the_file_that_the_run_writes(solver, tmp_path):
         tombolo.connect(file)
 
 
-def test_a_message_of_another_form_is_an_event_and_no_end():
-    state = State()
-    assert state.take("unknown", {"status": {"cycle": -1}}) == ("status", {"cycle": -1})
-    assert state.status is None
-
-
-def test_nobody_waits_for_a_reader_that_has_failed(solver, monkeypatch):
-    with tombolo.connect(solver.link) as run:
-        monkeypatch.setattr(run._state, "take", lambda kind, data: 1 / 0)
-        with pytest.raises(tombolo.FailedError, match="ZeroDivisionError"):
-            run.wait_for(lambda: False, 30)
-
-
 def test_a_lost_connection_is_made_again(solver):
     relay = Relay(solver.link)
     with tombolo.connect(relay.link) as run:
@@ -393,12 +348,13 @@ def test_a_closed_run_and_a_fork_are_told(solver):
         with pytest.raises(tombolo.CallError, match="closed"):
             ask()
     with tombolo.connect(solver.link) as run:
+        run.drive()
         child = os.fork()
         if child == 0:
             try:
                 run.pause()
             except tombolo.CallError:
-                os._exit(7)
+                os._exit(7 if not run.drives else 2)
             os._exit(1)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 

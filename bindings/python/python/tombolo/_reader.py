@@ -101,9 +101,10 @@ class Reader:
 
     @property
     def drives(self) -> bool:
-        """Whether the client steers."""
+        """Whether the client steers: not in a fork, and not once nothing comes any more."""
         client = self._client
-        return client is not None and client.drives
+        is_there = self.failure is None and os.getpid() == self._process
+        return is_there and client is not None and client.drives
 
     @property
     def missed(self) -> int:
@@ -117,6 +118,12 @@ class Reader:
             raise CallError("the run was connected before this process was forked; connect here")
         if self.closed:
             raise CallError("the run was closed; connect again")
+
+    def check_goes_on(self) -> None:
+        """An error where it was closed or is of another process, the run has ended or the connection is lost."""
+        self.check()
+        if self.failure is not None:
+            raise self._over(self.failure)
 
     def close(self) -> None:
         """Close the connection, and end every wait."""

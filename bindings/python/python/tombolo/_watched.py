@@ -13,7 +13,7 @@ from ._names import unknown
 from ._reader import Reader
 from ._waiting import in_thread
 from .errors import EndedError, WaitError
-from .events import Callbacks, Event, iterate
+from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
 from .state import Parameter, State, Status
 from .views import Surface, View, Views
@@ -217,7 +217,7 @@ class Watched:
         Parameters
         ----------
         *kinds : str
-            Only events of these kinds; without any, all.
+            Only events of these kinds, which `Event` lists; without any, all.
         timeout : float, optional
             Seconds to wait for each, at most.
 
@@ -230,7 +230,10 @@ class Watched:
         ------
         WaitError
             None came in time.
+        ConfigurationError
+            There are no events of such a kind.
         """
+        check_kinds(kinds)
         return self._iterate(self._reader.listen(), kinds, timeout)
 
     def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
@@ -238,7 +241,7 @@ class Watched:
         yield from iterate(self._reader, waiting, kinds, timeout)
 
     def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
-        """Have a function called with each event of a kind, or with every one where `kind` is None.
+        """Have a function called with each event of a kind, as `Event` lists them, or with every one for None.
 
         It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
         printed, and it is called again. While there is such a function, the run stays connected until it is closed,
@@ -248,7 +251,18 @@ class Watched:
         -------
         callable
             Call it to have the function called no more.
+
+        Raises
+        ------
+        ConfigurationError
+            There are no events of such a kind.
+        TypeError
+            It is no function.
         """
+        if kind is not None:
+            check_kinds((kind,))
+        if not callable(callback):
+            raise TypeError(f"callback: found {callback!r}, expected a function")
         return self._callbacks.add(self, kind, callback)
 
     # ---- The end.
@@ -263,4 +277,5 @@ class Watched:
         if self._state.end is not None:
             return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
         cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
-        return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
+        doing = ", driving" if self.drives else "" if self.connected else ", not connected"
+        return f"<tombolo.Run {place}, {cycle}{doing}>"

@@ -62,6 +62,8 @@ class Run(Watched):
         ------
         NotDriverError
             Somebody else steers, or this client may only watch.
+        EndedError, LinkError
+            The run has ended, or the connection was lost for good.
         """
         until = clock.monotonic() + timeout
         while not self._ask_for_wheel(until):
@@ -69,7 +71,7 @@ class Run(Watched):
 
     def _ask_for_wheel(self, until: float) -> bool:
         """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then."""
-        self._reader.check()
+        self._reader.check_goes_on()
         if self._watch:
             raise NotDriverError("this client only watches: it was connected with watch=True")
         if self.drives:
