@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json
+from ._values import number, whole
 from .errors import CallError, WaitError
 from .events import check_kinds
 from .orders import Command, Edits, Forecast, Order
@@ -128,7 +129,8 @@ class AsyncRun:
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
-        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(count))))
+        orders = whole(count, "count", 1)
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
 
     async def forecast(
         self,
@@ -159,7 +161,8 @@ class AsyncRun:
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
-        return await self._give(lambda client: client.set(parameter, float(value)), "set", timeout)
+        given = number(value, f"parameter {parameter!r}")
+        return await self._give(lambda client: client.set(parameter, given), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.pause`."""

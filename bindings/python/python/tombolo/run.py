@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _json
+from ._values import number, whole
 from ._waiting import in_thread
 from ._watched import Watched
 from .errors import LinkError, NotDriverError, RejectedError, WaitError
@@ -158,8 +159,9 @@ class Run(Watched):
 
     def undo(self, count: int = 1) -> Order:
         """Take the last orders back; returns the order that does so."""
+        orders = whole(count, "count", 1)
         self.drive()
-        return Order(self, self._reader.client.undo(count))
+        return Order(self, self._reader.client.undo(orders))
 
     def cancel(self, order: Union[Order, str], *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Take back an order that has not begun to move the mesh: it is rejected then."""
@@ -180,7 +182,8 @@ class Run(Watched):
         timeout : float, optional
             Seconds to wait, at most.
         """
-        return self._give(lambda: self._reader.client.set(parameter, float(value)), "set", wait, timeout)
+        given = number(value, f"parameter {parameter!r}")
+        return self._give(lambda: self._reader.client.set(parameter, given), "set", wait, timeout)
 
     def pause(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Hold the solver at its next safe point."""
@@ -322,4 +325,4 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
-    return Run(text, watch=watch, views=views, attempts=attempts)
+    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0))
