@@ -2,10 +2,13 @@
 
 import gc
 import re
+import sys
+import types
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
+import pytest
 import tombolo
 from conftest import wait
 from tombolo.jupyter import Plot, _svg, viewer
@@ -119,3 +122,10 @@ def test_a_monitor_is_plotted(run):
     parted = ElementTree.fromstring(_svg("t", np.arange(5), np.array([1, 2, np.nan, 3, 4])))
     assert len(list(parted.iter("{http://www.w3.org/2000/svg}polyline"))) == 2
     assert "nothing measured" in _svg("t", np.arange(2), np.full(2, np.nan))
+
+
+def test_a_plot_of_what_is_not_measured_does_not_live(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "IPython.display", types.SimpleNamespace(display=None))
+    for names, near in ((("helth", "quality.min"), "health"), (("health", "qality.min"), "quality.min")):
+        with pytest.raises(KeyError, match=rf"did you mean '{near}'"):
+            Plot(run, *names).live(timeout=30)

@@ -44,7 +44,7 @@ async def _in_slices(wait: Callable[[float], Found], timeout: Optional[float]) -
 
 
 class AsyncOrder:
-    """An order whose `wait` is a coroutine; it has what an `Order` has.
+    """An order whose `wait` and `cancel` are coroutines; it has what an `Order` has.
 
     Attributes
     ----------
@@ -61,6 +61,10 @@ class AsyncOrder:
     async def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
         """As `Order.wait`."""
         return await _in_slices(lambda left: self.order.wait(left, until=until), timeout)
+
+    async def cancel(self, *, timeout: Optional[float] = None) -> Command:
+        """As `Order.cancel`."""
+        return await self.order._run.aio.cancel(self.order, timeout=timeout)
 
     def __repr__(self) -> str:
         return repr(self.order)
@@ -93,6 +97,8 @@ class _Events(AsyncIterator["Event"]):
 class AsyncRun:
     """A `Run` whose methods that wait are coroutines: `run.aio`. What is only looked at is read from the run itself.
 
+    The end of an `async with` block closes the run.
+
     Attributes
     ----------
     run : Run
@@ -103,14 +109,21 @@ class AsyncRun:
     ::
 
         async def squeeze(run):
-            order = await run.aio.order(edits)
-            await order.wait()
-            async for event in run.aio.events("monitor"):
-                print(event.data["values"])
+            async with run.aio as aio:
+                order = await aio.order(edits)
+                await order.wait()
+                async for event in aio.events("monitor"):
+                    print(event.data["values"])
     """
 
     def __init__(self, run: Run) -> None:
         self.run = run
+
+    async def __aenter__(self) -> AsyncRun:
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self.close()
 
     async def order(
         self,

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import time as clock
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
+
+from ._waiting import moment_after
+from .errors import TomboloError
 
 if TYPE_CHECKING:
     from .run import Run
@@ -18,6 +22,8 @@ _WIDTH, _HEIGHT, _LEFT, _REST = 640, 220, 76, 28
 _POINTS = 2000
 #: Seconds between two drawings of a plot that lives.
 _PAUSE = 0.5
+#: How long a monitor that nobody knows may take to be announced, in seconds.
+_ANNOUNCED = 2.0
 #: Columns of a monitor's table that are no monitors.
 _STEP = ("cycle", "time")
 
@@ -123,11 +129,19 @@ class Plot:
         ----------
         timeout : float, optional
             Seconds, at most. The cell can be interrupted, too.
+
+        Raises
+        ------
+        KeyError
+            There is no such monitor.
         """
         from IPython.display import display
 
-        until = float("inf") if timeout is None else clock.monotonic() + timeout
-        self.run.wait_for(lambda: self.run.monitors.get(self.pipeline), timeout)
+        until = moment_after(timeout)
+        # One of a pipeline that was added a moment ago is announced a moment later.
+        with contextlib.suppress(TomboloError):
+            self.run.wait_for(lambda: self.monitor in self.run.monitors.get(self.pipeline, ()), _ANNOUNCED)
+        self._repr_svg_()
         handle: Any = display(self, display_id=True)
         while self.run.connected and clock.monotonic() < until:
             clock.sleep(_PAUSE)
