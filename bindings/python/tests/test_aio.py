@@ -135,3 +135,24 @@ def test_events_go_on_after_one_was_waited_for_in_vain(begin):
     assert waited > 0
     # None is lost.
     assert cycles == list(range(cycles[0], cycles[0] + 5))
+
+
+def test_an_order_is_cancelled_and_the_block_closes_the_run(begin):
+    running = begin(step=900.0)
+    with tombolo.connect(running.link) as run:
+
+        async def work():
+            async with run.aio as aio:
+                await aio.wait_for(lambda: run.features, 30)
+                order = await aio.order(SQUEEZE)
+                cancelled = asyncio.create_task(order.cancel(timeout=60))
+                await asyncio.sleep(0)
+                running.step = 0.002
+                try:
+                    assert (await cancelled).done
+                except tombolo.RejectedError as error:
+                    # It may have begun by then.
+                    assert order.id in str(error)
+
+        asyncio.run(work())
+        assert not run.connected

@@ -1,12 +1,23 @@
-"""The snippets of docs/python.md, from the first to the last."""
+"""The snippets of docs/python.md, from the first to the last, and the examples of docstrings that need a run."""
 
+import ast
+import asyncio
 import re
+import sys
+import textwrap
+import types
 from pathlib import Path
 
+import conftest
+import numpy as np
 import pytest
 import tombolo
+import tombolo.jupyter
+from conftest import ends
 
 PAGE = Path(__file__).parents[3] / "docs/python.md"
+PACKAGE = Path(tombolo.__file__).parent
+LINK = "http://127.0.0.1:7070/?token=..."
 
 
 def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
@@ -33,3 +44,62 @@ def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
         names["run"].close() if "run" in names else None
     assert "0.8 applied" in capsys.readouterr().out
     assert isinstance(names["shape"], tombolo.Shape)
+
+
+def examples():
+    """The blocks behind `::` in docstrings: those that doctest cannot run by itself."""
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    for file in sorted(PACKAGE.glob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text())):
+            text = ast.get_docstring(node) if isinstance(node, kinds) else None
+            for block in re.findall(r"::\n\n((?: {4}.*\n?|\n)+)", text or ""):
+                yield pytest.param(textwrap.dedent(block), id=f"{file.stem}.{getattr(node, 'name', '')}")
+
+
+def parts_of_a_channel(points, tets):
+    """The ends of the box, by the names that examples have for parts of a channel."""
+    parts = ends(points, tets)
+    return {"throat": parts["top"], "inlet": parts["bottom"]}
+
+
+EXAMPLES = list(examples())
+
+
+def test_the_examples_are_found():
+    assert {it.id for it in EXAMPLES} >= {
+        "run.connect",
+        "run.order",
+        "_watched.wait_for",
+        "aio.AsyncRun",
+        "jupyter.Plot",
+    }
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_an_example_runs(example, begin, monkeypatch):
+    monkeypatch.setattr(conftest, "ends", parts_of_a_channel)
+    difference = {"name": "flow", "of": "material.max", "minus": "material.min"}
+    flow = [{"statistics": {"field": "material"}}, {"difference": difference}]
+    pipelines = [{"name": "health", "stages": [{"quality": {}}]}, {"name": "outlet", "stages": flow}]
+    running = begin(conftest.study.configuration(*pipelines))
+    told = []
+
+    def tell(*values):
+        # Some examples go on until the run ends.
+        told.append(values)
+        if len(told) == 3:
+            running.adaptor.stop()
+
+    handle = types.SimpleNamespace(update=tell)
+    notebook = types.SimpleNamespace(display=lambda shown, display_id: handle)
+    monkeypatch.setitem(sys.modules, "IPython.display", notebook)
+    with tombolo.connect(running.link) as run:
+        run.wait_for(lambda: run.features, 30)
+        names = {"run": run, "tombolo": tombolo, "np": np, "print": tell}
+        names["edits"] = [{"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]
+        if LINK in example:
+            # Whoever connects first has the wheel.
+            run.close()
+        exec(compile(example.replace(LINK, running.link), "example", "exec"), names)
+        if "squeeze" in names:
+            asyncio.run(asyncio.wait_for(names["squeeze"](run), 60))

@@ -37,7 +37,7 @@ from .orders import Command, Forecast, Order
 from .run import Run, connect
 from .shaper import Shape, Shaper, Skeleton
 from .state import Parameter, Status
-from .views import Surface, View
+from .views import Surface, View, Views
 
 distributed: bool = _DISTRIBUTED
 """Whether this package was built with MPI."""
@@ -74,6 +74,7 @@ __all__ = [
     "SurfaceMotion",
     "TomboloError",
     "View",
+    "Views",
     "WaitError",
     "__version__",
     "connect",

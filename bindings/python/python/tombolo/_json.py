@@ -36,6 +36,8 @@ def text(value: object, name: str) -> str:
 
 def source(value: object, name: str) -> Source:
     """A dict or list as a text, and a name of a file as that."""
+    if value == "":
+        raise ConfigurationError(f"{name}: found an empty text, expected the name of a file, a dict or a list")
     if isinstance(value, (str, os.PathLike)):
         return Path(os.fspath(value))
     return text(value, name), name

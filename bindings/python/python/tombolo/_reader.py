@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import threading
 import time as clock
@@ -22,6 +23,8 @@ Found = TypeVar("Found")
 _SLICE = 0.2
 #: Events that wait for one who iterates over them; beyond it the oldest make way.
 _EVENTS = 4096
+
+_READERS: weakref.WeakSet[Reader] = weakref.WeakSet()
 
 
 class Reader:
@@ -54,6 +57,7 @@ class Reader:
         self._process = os.getpid()
         self._listeners: list[weakref.ref[deque[Event]]] = []
         self._thread = threading.Thread(target=self._read, args=(client,), name="tombolo-run", daemon=True)
+        _READERS.add(self)
         self._thread.start()
 
     def _read(self, client: _native.Client) -> None:
@@ -69,6 +73,8 @@ class Reader:
                 self.failure = failure
                 self._tell(Event("ended", str(failure)))
                 self.changed.notify_all()
+        if self.closed:
+            self._let_go()
 
     def _take(self, kind: str, payload: Any) -> None:
         data = _json.loads(payload) if isinstance(payload, str) and kind != "lost" else payload
@@ -95,9 +101,10 @@ class Reader:
 
     @property
     def drives(self) -> bool:
-        """Whether the client steers."""
+        """Whether the client steers: not in a fork, and not once nothing comes any more."""
         client = self._client
-        return client is not None and client.drives
+        is_there = self.failure is None and os.getpid() == self._process
+        return is_there and client is not None and client.drives
 
     @property
     def missed(self) -> int:
@@ -112,16 +119,34 @@ class Reader:
         if self.closed:
             raise CallError("the run was closed; connect again")
 
+    def check_goes_on(self) -> None:
+        """An error where it was closed or is of another process, the run has ended or the connection is lost."""
+        self.check()
+        if self.failure is not None:
+            raise self._over(self.failure)
+
     def close(self) -> None:
         """Close the connection, and end every wait."""
-        if self.closed or os.getpid() != self._process:
+        if os.getpid() != self._process:
             return
         with self.changed:
             self.closed = True
             self.changed.notify_all()
         if threading.current_thread() is not self._thread:
             self._thread.join(5.0)
-        client, self._missed, self._client = self._client, self.missed, None
+        self._let_go()
+
+    def abandon(self) -> None:
+        """Have the connection closed by the thread that reads.
+
+        The garbage collector calls it, on any thread and whatever that thread holds: nothing is waited for here.
+        """
+        self.closed = True
+
+    def _let_go(self) -> None:
+        with self.changed:
+            client, self._missed, self._client = self._client, self.missed, None
+            self.changed.notify_all()
         if client is not None:
             # Letting go of it would not do: the traceback of an error may hold it, and the wheel with it.
             client.close()
@@ -165,3 +190,10 @@ class Reader:
         """Wait for the next event of a queue that `listen` has returned."""
         self.wait_for(lambda: len(waiting) > 0, timeout)
         return waiting.popleft()
+
+
+@atexit.register
+def _close_all() -> None:
+    # A thread that reads must not outlive the interpreter.
+    for reader in list(_READERS):
+        reader.close()

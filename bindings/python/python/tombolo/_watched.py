@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import atexit
 import weakref
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Optional, TypeVar
 
 from . import _json, _native
+from ._names import unknown
 from ._reader import Reader
 from ._waiting import in_thread
 from .errors import EndedError, WaitError
-from .events import Callbacks, Event, iterate
+from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
 from .state import Parameter, State, Status
-from .views import Surface, View
+from .views import Surface, View, Views
 
 Found = TypeVar("Found")
 
 #: How long a view that nobody knows may take to be announced, in seconds.
 _ANNOUNCED = 2.0
-
-_RUNS: weakref.WeakSet[Watched] = weakref.WeakSet()
 
 
 class Watched:
@@ -34,7 +33,8 @@ class Watched:
         self._state = State()
         self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
         self._callbacks = Callbacks(self._reader)
-        _RUNS.add(self)
+        # The thread that reads holds the reader: without this a run that nobody has any more would keep the wheel.
+        weakref.finalize(self, self._reader.abandon).atexit = False
         try:
             self.wait_for(lambda: bool(self._state.hello), 20.0)
         except BaseException:
@@ -60,7 +60,7 @@ class Watched:
     @property
     def views(self) -> Mapping[str, View]:
         """The newest frame of each live view that has come."""
-        return MappingProxyType(self._state.views)
+        return Views(self._state.views, lambda: self.view_names)
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -199,7 +199,7 @@ class Watched:
         try:
             self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
         except WaitError:
-            raise KeyError(f"no view '{name}'; there are: {', '.join(self.view_names)}") from None
+            raise KeyError(unknown("view", name, self.view_names)) from None
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""
@@ -217,7 +217,7 @@ class Watched:
         Parameters
         ----------
         *kinds : str
-            Only events of these kinds; without any, all.
+            Only events of these kinds, which `Event` lists; without any, all.
         timeout : float, optional
             Seconds to wait for each, at most.
 
@@ -230,21 +230,40 @@ class Watched:
         ------
         WaitError
             None came in time.
+        ConfigurationError
+            There are no events of such a kind.
         """
-        return iterate(self._reader, self._reader.listen(), kinds, timeout)
+        check_kinds(kinds)
+        return self._iterate(self._reader.listen(), kinds, timeout)
+
+    def _iterate(self, waiting: deque[Event], kinds: tuple[str, ...], timeout: Optional[float]) -> Iterator[Event]:
+        # A generator of the run's own, which holds the run as long as somebody iterates.
+        yield from iterate(self._reader, waiting, kinds, timeout)
 
     def on(self, kind: Optional[str], callback: Callable[[Event], object]) -> Callable[[], None]:
-        """Have a function called with each event of a kind, or with every one where `kind` is None.
+        """Have a function called with each event of a kind, as `Event` lists them, or with every one for None.
 
         It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
-        printed, and it is called again.
+        printed, and it is called again. While there is such a function, the run stays connected until it is closed,
+        though nothing else refers to it.
 
         Returns
         -------
         callable
             Call it to have the function called no more.
+
+        Raises
+        ------
+        ConfigurationError
+            There are no events of such a kind.
+        TypeError
+            It is no function.
         """
-        return self._callbacks.add(kind, callback)
+        if kind is not None:
+            check_kinds((kind,))
+        if not callable(callback):
+            raise TypeError(f"callback: found {callback!r}, expected a function")
+        return self._callbacks.add(self, kind, callback)
 
     # ---- The end.
 
@@ -258,11 +277,5 @@ class Watched:
         if self._state.end is not None:
             return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
         cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
-        return f"<tombolo.Run {place}, {cycle}{', driving' if self.drives else ''}>"
-
-
-@atexit.register
-def _close_all() -> None:
-    # A thread that reads must not outlive the interpreter.
-    for run in list(_RUNS):
-        run.close()
+        doing = ", driving" if self.drives else "" if self.connected else ", not connected"
+        return f"<tombolo.Run {place}, {cycle}{doing}>"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, Optional, Union
+from typing import Any, Literal, NamedTuple, Optional, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _json, _native
+from ._values import number
 from .errors import ConfigurationError
 from .mesh import Mesh
 
@@ -20,6 +21,9 @@ __all__ = ["Adaptor", "Motion", "Steering", "SurfaceMotion"]
 Document = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Any]]
 Range = tuple[float, float, float]
 Condition = Literal["inflow", "outflow", "wall"]
+Given = TypeVar("Given")
+
+_CONDITIONS = "'inflow', 'outflow' or 'wall'"
 
 
 class SurfaceMotion:
@@ -150,15 +154,27 @@ class Steering(NamedTuple):
 
 def _ranges(parameters: Optional[Mapping[str, Range]]) -> list[tuple[str, float, float, float]]:
     ranges = []
-    for name, given in (parameters or {}).items():
+    for name, given in _named(parameters, "parameters", "(value, minimum, maximum)"):
         try:
-            value, minimum, maximum = (float(number) for number in given)
+            value, minimum, maximum = (number(it, name) for it in given)
         except (TypeError, ValueError):
             raise ConfigurationError(
                 f"parameter '{name}': found {given!r}, expected (value, minimum, maximum)"
             ) from None
-        ranges.append((str(name), value, minimum, maximum))
+        ranges.append((name, value, minimum, maximum))
     return ranges
+
+
+def _named(given: Optional[Mapping[str, Given]], title: str, expected: str) -> Iterable[tuple[str, Given]]:
+    """The names in a dict, and what it says of each."""
+    if given is None:
+        return ()
+    if not isinstance(given, Mapping):
+        raise ConfigurationError(f"{title}: found {given!r}, expected a dict from names to {expected}")
+    for name in given:
+        if not isinstance(name, str) or not name:
+            raise ConfigurationError(f"{title}: found the name {name!r}, expected a text that is not empty")
+    return given.items()
 
 
 class Adaptor:
@@ -247,7 +263,7 @@ class Adaptor:
             None if orders is None else _json.source(orders, "orders"),
             None if replay is None else os.fspath(replay),
             _ranges(parameters),
-            [(str(feature), str(condition)) for feature, condition in (conditions or {}).items()],
+            [(name, str(condition)) for name, condition in _named(conditions, "conditions", _CONDITIONS)],
             None if output is None else os.fspath(output),
             handle,
         )

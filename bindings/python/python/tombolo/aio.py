@@ -9,13 +9,14 @@ from collections.abc import AsyncIterator, Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json
+from ._values import number, whole
 from .errors import CallError, WaitError
+from .events import check_kinds
 from .orders import Command, Edits, Forecast, Order
 from .run import _text
 
 if TYPE_CHECKING:
     from . import _native
-    from ._reader import Reader
     from .events import Event
     from .run import Run
     from .state import Status
@@ -43,7 +44,7 @@ async def _in_slices(wait: Callable[[float], Found], timeout: Optional[float]) -
 
 
 class AsyncOrder:
-    """An order whose `wait` is a coroutine; it has what an `Order` has.
+    """An order whose `wait` and `cancel` are coroutines; it has what an `Order` has.
 
     Attributes
     ----------
@@ -61,6 +62,10 @@ class AsyncOrder:
         """As `Order.wait`."""
         return await _in_slices(lambda left: self.order.wait(left, until=until), timeout)
 
+    async def cancel(self, *, timeout: Optional[float] = None) -> Command:
+        """As `Order.cancel`."""
+        return await self.order._run.aio.cancel(self.order, timeout=timeout)
+
     def __repr__(self) -> str:
         return repr(self.order)
 
@@ -68,9 +73,9 @@ class AsyncOrder:
 class _Events(AsyncIterator["Event"]):
     """What a run tells. No generator, which the cancellation of one wait for an event would end for good."""
 
-    def __init__(self, reader: Reader, kinds: tuple[str, ...]) -> None:
-        self._reader, self._kinds = reader, kinds
-        self._waiting: deque[Event] = reader.listen()
+    def __init__(self, run: Run, kinds: tuple[str, ...]) -> None:
+        self._run, self._reader, self._kinds = run, run._reader, kinds
+        self._waiting: deque[Event] = self._reader.listen()
         self._is_over = False
 
     async def __anext__(self) -> Event:
@@ -92,6 +97,8 @@ class _Events(AsyncIterator["Event"]):
 class AsyncRun:
     """A `Run` whose methods that wait are coroutines: `run.aio`. What is only looked at is read from the run itself.
 
+    The end of an `async with` block closes the run.
+
     Attributes
     ----------
     run : Run
@@ -102,14 +109,21 @@ class AsyncRun:
     ::
 
         async def squeeze(run):
-            order = await run.aio.order(edits)
-            await order.wait()
-            async for event in run.aio.events("monitor"):
-                print(event.data["values"])
+            async with run.aio as aio:
+                order = await aio.order(edits)
+                await order.wait()
+                async for event in aio.events("monitor"):
+                    print(event.data["values"])
     """
 
     def __init__(self, run: Run) -> None:
         self.run = run
+
+    async def __aenter__(self) -> AsyncRun:
+        return self
+
+    async def __aexit__(self, *error: object) -> None:
+        await self.close()
 
     async def order(
         self,
@@ -128,7 +142,8 @@ class AsyncRun:
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
-        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(count))))
+        orders = whole(count, "count", 1)
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
 
     async def forecast(
         self,
@@ -159,7 +174,8 @@ class AsyncRun:
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
-        return await self._give(lambda client: client.set(parameter, float(value)), "set", timeout)
+        given = number(value, f"parameter {parameter!r}")
+        return await self._give(lambda client: client.set(parameter, given), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """As `Run.pause`."""
@@ -220,7 +236,8 @@ class AsyncRun:
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
         """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
-        return _Events(self.run._reader, kinds)
+        check_kinds(kinds)
+        return _Events(self.run, kinds)
 
     async def close(self) -> None:
         """As `Run.close`."""

@@ -2,43 +2,94 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import time as clock
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
+from ._waiting import moment_after
+from .errors import TomboloError
+
 if TYPE_CHECKING:
     from .run import Run
 
-__all__ = ["Plot", "viewer"]
+__all__ = ["Plot", "summary", "viewer"]
 
 #: Size of a plot and its margins, in pixels; the most points that its line is drawn with.
 _WIDTH, _HEIGHT, _LEFT, _REST = 640, 220, 76, 28
 _POINTS = 2000
 #: Seconds between two drawings of a plot that lives.
 _PAUSE = 0.5
+#: How long a monitor that nobody knows may take to be announced, in seconds.
+_ANNOUNCED = 2.0
+#: Columns of a monitor's table that are no monitors.
+_STEP = ("cycle", "time")
 
 
-def viewer(link: str, *, height: int = 640) -> str:
-    """The viewer of a run as HTML: what a notebook shows of a `Run`.
+def viewer(link: str) -> str:
+    """A link as HTML that opens the viewer of a run in a new tab.
+
+    The viewer is not shown in the notebook itself: its pages refuse to be in a frame, so that no other page can lay
+    itself over them (docs/security.md).
 
     Parameters
     ----------
     link : str
-        The run's link. It is in the HTML, and with it in the notebook's file: whoever reads that can do what it is for
-        while the run goes on.
-    height : int
-        In pixels.
+        The run's link. It is in the HTML, though not in the text that is seen, and with it in the notebook's file:
+        whoever reads that can do what it is for while the run goes on.
 
     Examples
     --------
     >>> from tombolo.jupyter import viewer
-    >>> viewer("http://127.0.0.1:7070/?token=a&b", height=300)
-    '<iframe src="http://127.0.0.1:7070/?token=a&amp;b" width="100%" height="300" style="border: 0"></iframe>'
+    >>> print(viewer("http://127.0.0.1:7070/?token=a"))
+    <a href="http://127.0.0.1:7070/?token=a" target="_blank" rel="noopener noreferrer">Open the viewer in a new tab</a>
     """
-    source = html.escape(link, quote=True)
-    return f'<iframe src="{source}" width="100%" height="{height}" style="border: 0"></iframe>'
+    if not link.startswith(("http://", "https://")):
+        return "The run listens on a socket at a path, which no browser opens."
+    address = html.escape(link, quote=True)
+    return f'<a href="{address}" target="_blank" rel="noopener noreferrer">Open the viewer in a new tab</a>'
+
+
+def summary(run: Run) -> str:
+    """How far a run is, the newest values of its monitors, and a link to its viewer, as HTML.
+
+    It is what a notebook shows of a `Run`. It does not wait, and does not change any more: `Plot.live` does.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    """
+    status, end = run._state.status, run.end
+    rows = [("run", run.link.split("?")[0]), ("state", _state(run))]
+    if end is not None:
+        rows += [("cycle", f"{end['cycle']}"), ("time", f"{end['time']:.6g}")]
+    elif status is not None:
+        rows += [("cycle", f"{status.cycle}"), ("time", f"{status.time:.6g}")]
+    for pipeline, table in run.monitors.items():
+        last = table.last
+        shown = [name if name not in last else f"{name} {last[name]:.6g}" for name in table if name not in _STEP]
+        rows.append((pipeline, ", ".join(shown)))
+    cells = "".join(
+        f'<tr><th style="text-align: left">{html.escape(name)}</th>'
+        f'<td style="text-align: left">{html.escape(text)}</td></tr>'
+        for name, text in rows
+    )
+    return f"<table>{cells}</table>{viewer(run.link)}"
+
+
+def _state(run: Run) -> str:
+    status = run._state.status
+    if run.end is not None:
+        return str(run.end["how"])
+    if not run.connected:
+        return "not connected"
+    if status is None:
+        return "before its first step"
+    running = "stopping" if status.stopped else "paused" if status.paused else "running"
+    return f"{running}, steered from here" if run.drives else running
 
 
 class Plot:
@@ -78,11 +129,19 @@ class Plot:
         ----------
         timeout : float, optional
             Seconds, at most. The cell can be interrupted, too.
+
+        Raises
+        ------
+        KeyError
+            There is no such monitor.
         """
         from IPython.display import display
 
-        until = float("inf") if timeout is None else clock.monotonic() + timeout
-        self.run.wait_for(lambda: self.run.monitors.get(self.pipeline), timeout)
+        until = moment_after(timeout)
+        # One of a pipeline that was added a moment ago is announced a moment later.
+        with contextlib.suppress(TomboloError):
+            self.run.wait_for(lambda: self.monitor in self.run.monitors.get(self.pipeline, ()), _ANNOUNCED)
+        self._repr_svg_()
         handle: Any = display(self, display_id=True)
         while self.run.connected and clock.monotonic() < until:
             clock.sleep(_PAUSE)

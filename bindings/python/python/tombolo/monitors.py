@@ -9,6 +9,8 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import NDArray
 
+from ._names import unknown
+
 __all__ = ["MonitorTable", "Monitors"]
 
 #: The most rows that a table keeps: the newest.
@@ -37,10 +39,22 @@ class MonitorTable(Mapping[str, NDArray[np.float64]]):
         self._begin = 0
         self._end = 0
 
+    def _announce(self, name: str) -> None:
+        """Have a column for a monitor, which may have no row yet."""
+        with self._lock:
+            capacity = self._capacity
+            for column in ("cycle", "time", name):
+                if column not in self._columns:
+                    self._columns[column] = np.full(capacity, np.nan)
+
+    @property
+    def _capacity(self) -> int:
+        return len(next(iter(self._columns.values()))) if self._columns else 0
+
     def _append(self, told: Mapping[str, Any]) -> None:
         row: dict[str, Any] = {"cycle": told["cycle"], "time": told["time"], **told["values"]}
         with self._lock:
-            capacity = len(next(iter(self._columns.values()))) if self._columns else 0
+            capacity = self._capacity
             if self._end == capacity:
                 self._begin = max(self._begin, self._end - ROWS)
                 kept = slice(self._begin, self._end)
@@ -64,8 +78,8 @@ class MonitorTable(Mapping[str, NDArray[np.float64]]):
             try:
                 column = self._columns[name][self._begin : self._end]
             except KeyError:
-                known = ", ".join(self._columns) or "none yet"
-                raise KeyError(f"no monitor '{name}' in the pipeline '{self.pipeline}'; there are: {known}") from None
+                where = f"there are in the pipeline '{self.pipeline}'"
+                raise KeyError(unknown("monitor", name, self._columns, where)) from None
         column.flags.writeable = False
         return column
 
@@ -106,7 +120,7 @@ class MonitorTable(Mapping[str, NDArray[np.float64]]):
 
 
 class Monitors(Mapping[str, MonitorTable]):
-    """The monitors of a run: for each pipeline that has some a table."""
+    """The monitors of a run: for each pipeline that has some a table, without rows until something was measured."""
 
     def __init__(self) -> None:
         self._tables: dict[str, MonitorTable] = {}
@@ -121,8 +135,7 @@ class Monitors(Mapping[str, MonitorTable]):
         try:
             return self._tables[pipeline]
         except KeyError:
-            known = ", ".join(self._tables) or "none yet"
-            raise KeyError(f"no monitors of a pipeline '{pipeline}'; there are those of: {known}") from None
+            raise KeyError(unknown("monitors of a pipeline", pipeline, self, "there are those of")) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(list(self._tables))

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import time as clock
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-from .errors import EndedError, RejectedError
+from ._waiting import moment_after
+from .errors import EndedError, RejectedError, TomboloError
 
 if TYPE_CHECKING:
     from .run import Run
 
 __all__ = ["Command", "Forecast", "Order"]
 
+#: How long a status may take to come behind an answer, in seconds.
+_STATUS = 2.0
 #: Edits or a whole order, as Python's values or as a file.
 Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
 
@@ -215,7 +220,7 @@ class Command:
         return kind, data
 
     def wait(self, timeout: Optional[float] = None) -> Command:
-        """Wait until it has taken effect.
+        """Wait until it has taken effect; of `pause` and `resume`, until `Run.status` shows it too.
 
         Raises
         ------
@@ -224,6 +229,7 @@ class Command:
         WaitError
             It did not take effect in time; it may still.
         """
+        until = moment_after(timeout)
         try:
             answer = self._run.wait_for(self._answer, timeout)
         except EndedError:
@@ -233,7 +239,20 @@ class Command:
             raise
         if answer is not None and answer[0] == "error":
             raise RejectedError(answer[1]["message"])
+        if self.task in ("pause", "resume"):
+            self._wait_for_status(self.task == "pause", min(until - clock.monotonic(), _STATUS))
         return self
+
+    def _wait_for_status(self, paused: bool, timeout: float) -> None:
+        """Wait for the status that comes behind the answer."""
+
+        def is_shown() -> bool:
+            status = self._run._state.status
+            return status is not None and status.paused == paused
+
+        # Somebody else may have had it otherwise by then, or the run may be over: it has taken effect all the same.
+        with contextlib.suppress(TomboloError):
+            self._run.wait_for(is_shown, timeout)
 
     def __repr__(self) -> str:
         return f"<tombolo.Command {self.id}: {self.task}, {'done' if self.done else 'on its way'}>"

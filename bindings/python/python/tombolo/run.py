@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _json
+from ._values import number, whole
 from ._waiting import in_thread
 from ._watched import Watched
-from .errors import LinkError, NotDriverError, RejectedError
+from .errors import LinkError, NotDriverError, RejectedError, WaitError
 from .orders import Command, Edits, Forecast, Order
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ __all__ = ["Run", "connect"]
 _WHEEL = 8.0
 #: How long it is asked for at once.
 _SLICE = 0.2
+#: How long one who has left may still be told as the driver.
+_LEAVING = 1.0
 #: How links begin.
 _SCHEMES = ("http://", "https://", "unix:")
 
@@ -32,13 +35,14 @@ class Run(Watched):
 
     A thread of its own reads what the run tells, so that `status`, `views` and `monitors` are always the newest. A
     connection that is lost is made again with growing pauses. Any thread may use it. Every wait ends with Ctrl-C. It
-    closes with `close`, at the end of a `with` block, or with the interpreter; the run itself goes on.
+    closes with `close`, at the end of a `with` block, once nothing refers to it any more, or with the interpreter; the
+    run itself goes on.
 
     Attributes
     ----------
     link : str
         The link that it was connected by: whoever has it can do what it is for.
-    views : mapping of str to View
+    views : Views
         The newest frame of each live view that has come.
     monitors : Monitors
         For each pipeline that has monitors a table that grows.
@@ -59,6 +63,8 @@ class Run(Watched):
         ------
         NotDriverError
             Somebody else steers, or this client may only watch.
+        EndedError, LinkError
+            The run has ended, or the connection was lost for good.
         """
         until = clock.monotonic() + timeout
         while not self._ask_for_wheel(until):
@@ -66,7 +72,7 @@ class Run(Watched):
 
     def _ask_for_wheel(self, until: float) -> bool:
         """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then."""
-        self._reader.check()
+        self._reader.check_goes_on()
         if self._watch:
             raise NotDriverError("this client only watches: it was connected with watch=True")
         if self.drives:
@@ -74,10 +80,20 @@ class Run(Watched):
         try:
             in_thread(lambda: self._reader.client.drive(_SLICE))
         except NotDriverError:
-            taken = self._state.status is not None and self._state.status.driver is not None
-            if taken or clock.monotonic() >= until:
+            if self._is_taken(until) or clock.monotonic() >= until:
                 raise
         return self.drives
+
+    def _is_taken(self, until: float) -> bool:
+        """Whether somebody else steers, and still does after a moment: of one who has just left it is told late."""
+
+        def is_free() -> bool:
+            return self.drives or self._state.status is None or self._state.status.driver is None
+
+        try:
+            return not self.wait_for(is_free, max(min(_LEAVING, until - clock.monotonic()), 0.0))
+        except WaitError:
+            return True
 
     def order(
         self,
@@ -143,8 +159,9 @@ class Run(Watched):
 
     def undo(self, count: int = 1) -> Order:
         """Take the last orders back; returns the order that does so."""
+        orders = whole(count, "count", 1)
         self.drive()
-        return Order(self, self._reader.client.undo(count))
+        return Order(self, self._reader.client.undo(orders))
 
     def cancel(self, order: Union[Order, str], *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Take back an order that has not begun to move the mesh: it is rejected then."""
@@ -165,7 +182,8 @@ class Run(Watched):
         timeout : float, optional
             Seconds to wait, at most.
         """
-        return self._give(lambda: self._reader.client.set(parameter, float(value)), "set", wait, timeout)
+        given = number(value, f"parameter {parameter!r}")
+        return self._give(lambda: self._reader.client.set(parameter, given), "set", wait, timeout)
 
     def pause(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Hold the solver at its next safe point."""
@@ -246,9 +264,9 @@ class Run(Watched):
         return Plot(self, pipeline, monitor)
 
     def _repr_html_(self) -> str:
-        from .jupyter import viewer
+        from .jupyter import summary
 
-        return viewer(self.link)
+        return summary(self)
 
 
 def _text(
@@ -307,4 +325,4 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
-    return Run(text, watch=watch, views=views, attempts=attempts)
+    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
 
 import numpy as np
@@ -117,6 +118,24 @@ def _of_meshio(mesh: Any) -> Mesh:
     )
 
 
+def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
+    if "replaces" in settings:
+        raise TypeError("replaces: without a run there is no order that could be replaced")
+    return _json.order(edits, settings)
+
+
+_EXPECTED = "a tombolo.Mesh, a mesh of meshio or PyVista, a vtkDataSet, or coordinates with their cells"
+
+
+def _what_it_is(given: object) -> str:
+    """What was given in place of a mesh, and what would have made one of it."""
+    if isinstance(given, (str, os.PathLike)):
+        return f"the name of a file, '{os.fspath(given)}' (read it first: tombolo.Shaper(meshio.read(...)))"
+    if isinstance(given, (np.ndarray, Sequence)):
+        return "coordinates without cells (tombolo.Shaper(points, cells))"
+    return f"a {type(given).__name__}"
+
+
 class Shaper:
     """Gives a mesh other shapes: what `tombolo edit` does, to the bit.
 
@@ -174,6 +193,10 @@ class Shaper:
                 from . import vtk
 
                 mesh = vtk.to_mesh(mesh)
+            else:
+                raise MeshError(f"found {_what_it_is(mesh)}, expected {_EXPECTED}")
+        elif isinstance(mesh, Mapping) and "points" not in mesh and len(mesh) != 1:
+            raise MeshError(f"found {len(mesh)} meshes ({', '.join(map(str, mesh))}), expected one")
         self._shaper = _native.Shaper(mesh, angle)
 
     # ---- What the mesh is.
@@ -232,14 +255,14 @@ class Shaper:
             The mesh would be broken, or one of two coordinates would leave its plane. The text says where; `report` has
             the fraction that would pass.
         """
-        text, name = _json.order(edits, settings)
+        text, name = _order(edits, settings)
         points, told = self._work(lambda: self._shaper.shape(text, name), progress)
         details = _json.loads(told)
         return Shape(points, details["fraction"], details["min_scaled_jacobian"], details["quality"], details)
 
     def forecast(self, edits: Edits, *, progress: Optional[Progress] = None, **settings: Mapping[str, Any]) -> Forecast:
         """Find out what edits would come to, also where they would be rejected. Parameters as of `shape`."""
-        text, name = _json.order(edits, settings)
+        text, name = _order(edits, settings)
         return Forecast(_json.loads(self._work(lambda: self._shaper.forecast(text, name), progress)))
 
     def displacement(self, edits: Edits, *, progress: Optional[Progress] = None) -> NDArray[np.float64]:

@@ -125,6 +125,8 @@ class State:
             for report in data.pop("orders", []):
                 self._take_order(report)
             self.stack = data.get("stack", self.stack)
+            for monitor in data.get("monitors", []):
+                self.monitors._table(monitor["pipeline"])._announce(monitor["name"])
             self.hello = data
         elif kind == "status":
             self.status = Status._of(data)
@@ -159,6 +161,11 @@ class State:
             features = frame.get("features")
         else:
             triangles, lines, features = before.triangles, before.lines, before.features
+        fields = {field: values for field, _, values in frame["fields"]}
+        for array in (frame["points"], triangles, lines, features, *fields.values()):
+            if array is not None:
+                # Views of later steps share what has not changed.
+                array.setflags(write=False)
         return View(
             name,
             frame["cycle"],
@@ -167,6 +174,6 @@ class State:
             triangles,
             lines,
             features,
-            {field: values for field, _, values in frame["fields"]},
+            fields,
             {field: association for field, association, _ in frame["fields"]},
         )

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, Optional
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "View"]
+from ._names import unknown
+
+__all__ = ["Surface", "View", "Views"]
 
 
 def _of(fields: Mapping[str, NDArray[np.float64]], associations: Mapping[str, str], kind: str) -> dict[str, Any]:
@@ -16,7 +18,7 @@ def _of(fields: Mapping[str, NDArray[np.float64]], associations: Mapping[str, st
 
 
 class View(NamedTuple):
-    """A view at one step: triangles and lines, with fields. It does not change any more once it is here.
+    """A view at one step: triangles and lines, with fields. It does not change any more: its arrays are read-only.
 
     Attributes
     ----------
@@ -65,15 +67,16 @@ class View(NamedTuple):
 
         count = len(self.triangles)
         cells = [("triangle", self.triangles.astype(np.int64)), ("line", self.lines.astype(np.int64))]
+        # Copies: what is here is read-only.
         data = {
-            name: [values[:count], values[count:]]
+            name: [values[:count].copy(), values[count:].copy()]
             for name, values in _of(self.fields, self.associations, "element").items()
         }
         kept = [index for index, (_, rows) in enumerate(cells) if len(rows)]
         return meshio.Mesh(
-            self.points,
+            self.points.copy(),
             [cells[index] for index in kept],
-            point_data=_of(self.fields, self.associations, "vertex"),
+            point_data={name: values.copy() for name, values in _of(self.fields, self.associations, "vertex").items()},
             cell_data={name: [parts[index] for index in kept] for name, parts in data.items()},
         )
 
@@ -83,6 +86,41 @@ class View(NamedTuple):
             f"<tombolo.View '{self.name}' at cycle {self.cycle}: {len(self.points)} points, "
             f"{len(self.triangles)} triangles, {len(self.lines)} lines, fields: {fields}>"
         )
+
+
+class Views(Mapping[str, View]):
+    """The newest frame of each live view that has come.
+
+    Parameters
+    ----------
+    frames : dict of str to View
+        The frames, which change while the run goes on.
+    announced : callable
+        Returns the names of the live views.
+    """
+
+    def __init__(self, frames: Mapping[str, View], announced: Callable[[], Sequence[str]]) -> None:
+        self._frames = frames
+        self._announced = announced
+
+    def __getitem__(self, name: str) -> View:
+        try:
+            return self._frames[name]
+        except KeyError:
+            names = self._announced()
+            if name in names:
+                hint = f"run.wait_for_view({name!r}) waits for it"
+                raise KeyError(f"no frame of the view '{name}' has come yet; {hint}") from None
+            raise KeyError(unknown("view", name, names)) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(list(self._frames))
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __repr__(self) -> str:
+        return f"<tombolo.Views: {', '.join(self) or 'none has come yet'}>"
 
 
 class Surface(NamedTuple):
@@ -113,6 +151,8 @@ class Surface(NamedTuple):
 
     def faces_of(self, feature: str) -> NDArray[np.int64]:
         """The numbers of a feature's faces, as the region `faces` of an edit takes them."""
+        if feature not in self.names:
+            raise KeyError(unknown("feature", feature, self.names))
         return np.flatnonzero(self.features == self.names.index(feature))
 
     def to_pyvista(self) -> Any:

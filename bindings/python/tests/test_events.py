@@ -1,0 +1,92 @@
+"""What a run tells: iterated over, called with, and the end of it."""
+
+import sys
+import threading
+
+import pytest
+import tombolo
+from tombolo.state import State
+
+
+def test_events_are_iterated_and_called_with(run, capfd):
+    seen, called, others = set(), [], []
+    run.on("monitor", lambda event: 1 / 0)
+    remove = run.on("monitor", called.append)
+    run.on(None, others.append)
+    for event in run.events("monitor", "frame", timeout=30):
+        seen.add(event.kind)
+        if seen == {"monitor", "frame"}:
+            break
+    run.wait_for(lambda: len(called) > 2 and {"monitor", "frame", "status"} <= {event.kind for event in others}, 30)
+    assert {event.kind for event in called} == {"monitor"}
+    assert "ZeroDivisionError" in capfd.readouterr().err
+    remove()
+    count = len(others)
+    run.wait_for(lambda: len(others) > count + 10, 30)
+    # One call may have been under way.
+    count, end = len(called), len(others)
+    run.wait_for(lambda: len(others) > end + 30, 30)
+    assert len(called) == count
+    with pytest.raises(tombolo.WaitError):
+        next(run.events("lost", timeout=0.3))
+
+
+def test_there_are_no_events_of_a_kind_that_is_misspelt(run, capfd):
+    for ask in (
+        lambda: run.on("moniter", print),
+        lambda: run.events("status", "moniter"),
+        lambda: run.aio.events("moniter"),
+    ):
+        with pytest.raises(tombolo.ConfigurationError, match=r"no event 'moniter' \(did you mean 'monitor'\?\)"):
+            ask()
+    for callback in (3, None):
+        with pytest.raises(TypeError, match="expected a function"):
+            run.on("monitor", callback)
+    called = []
+
+    def leave(event):
+        called.append(event)
+        sys.exit("away")
+
+    run.on("monitor", leave)
+    run.wait_for(lambda: len(called) > 2, 30)
+    assert "away" in capfd.readouterr().err
+
+
+def test_the_end_ends_every_wait(solver, run):
+    waits = []
+
+    def wait():
+        try:
+            run.wait_for(lambda: False)
+        except tombolo.EndedError as error:
+            waits.append(str(error))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    run.wait_for_cycle(2, 30)
+    run.stop(timeout=30)
+    thread.join(30)
+    solver.thread.join(30)
+    assert run.wait(30)["how"] == "stopped" and solver.stopped
+    assert waits and "the run has ended" in waits[0]
+    assert [event.kind for event in run.events()] == ["ended"]
+    assert list(run.events("monitor")) == []
+    assert not run.drives and "driving" not in repr(run)
+    for ask in (run.drive, lambda: run.pause(timeout=30)):
+        with pytest.raises(tombolo.EndedError, match="the run has ended: stopped"):
+            ask()
+    assert run.monitors["health"].rows
+
+
+def test_a_message_of_another_form_is_an_event_and_no_end():
+    state = State()
+    assert state.take("unknown", {"status": {"cycle": -1}}) == ("status", {"cycle": -1})
+    assert state.status is None
+
+
+def test_nobody_waits_for_a_reader_that_has_failed(solver, monkeypatch):
+    with tombolo.connect(solver.link) as run:
+        monkeypatch.setattr(run._state, "take", lambda kind, data: 1 / 0)
+        with pytest.raises(tombolo.FailedError, match="ZeroDivisionError"):
+            run.wait_for(lambda: False, 30)

@@ -1,0 +1,67 @@
+"""What is known of a run at once, what is not there yet, and what is not there at all."""
+
+import numpy as np
+import pytest
+import tombolo
+
+
+def test_what_is_announced_is_there_at_once(begin):
+    # Nothing is measured or shown while this looks.
+    running = begin(step=900.0)
+    with tombolo.connect(running.link) as run:
+        table = run.monitors["health"]
+        assert {"cycle", "time", "quality.min", "temperature.max"} <= set(table)
+        assert len(table["quality.min"]) == table.rows <= 1
+        assert {"cycle", "quality.min"} <= set(table.last) or table.last == {}
+        assert run.plot("health", "quality.min")._repr_svg_().startswith("<svg")
+
+
+def test_before_the_first_step_there_are_tables_without_rows(tmp_path):
+    pipelines = [
+        {"name": "health", "stages": [{"quality": {}}]},
+        {"name": "skin", "stages": [{"surface": {}}, {"stream": {}}]},
+    ]
+    configuration = {"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": pipelines}
+    with tombolo.Adaptor(configuration, output=tmp_path) as adaptor, tombolo.connect(adaptor.link) as run:
+        table = run.monitors["health"]
+        assert table.rows == 0 and table.last == {} and len(table["quality.min"]) == 0
+        assert "nothing measured yet" in run.plot("health", "quality.min")._repr_svg_()
+        pytest.importorskip("pandas")
+        assert len(run.monitors.to_pandas()) == 0
+        with pytest.raises(KeyError, match=r"no frame of the view 'skin' .* run\.wait_for_view\('skin'\)"):
+            run.views["skin"]
+        assert run.views.get("skin") is None and not run.views
+
+
+def test_of_what_is_not_there_the_nearest_is_told(run):
+    run.wait_for_view("midplane", timeout=30)
+    for ask, near in (
+        (lambda: run.views["midplan"], "no view 'midplan' (did you mean 'midplane'?); there are: midplane"),
+        (lambda: run.wait_for_view("midplan", timeout=5), "no view 'midplan' (did you mean 'midplane'?)"),
+        (lambda: run.monitors["helth"], "no monitors of a pipeline 'helth' (did you mean 'health'?)"),
+        (lambda: run.monitors["health"]["qality.min"], "no monitor 'qality.min' (did you mean 'quality.min'?)"),
+        (lambda: run.surface.faces_of("topp"), "no feature 'topp' (did you mean 'top'?); there are: top, bottom"),
+        (lambda: run.views["nothing alike"], "no view 'nothing alike'; there are: midplane"),
+        (lambda: run.views[3], "no view '3'; there are: midplane"),
+    ):
+        with pytest.raises(KeyError) as error:
+            ask()
+        assert near in error.value.args[0]
+    assert list(run.views) == ["midplane"] and "midplane" in repr(run.views) and dict(run.views)
+
+
+def test_a_view_does_not_change_any_more(run):
+    view = run.wait_for_view("midplane", timeout=30)
+    for array in (view.points, view.triangles, view.lines, view.features, *view.fields.values()):
+        if array is not None:
+            with pytest.raises(ValueError, match="read-only"):
+                array[:] = 0
+    later = run.wait_for_view("midplane", after=view.cycle, timeout=30)
+    assert later.triangles.any() and np.array_equal(later.triangles, view.triangles)
+    pytest.importorskip("meshio")
+    # Copies are anybody's own.
+    mesh = later.to_meshio()
+    mesh.points[:] = 0
+    mesh.point_data["temperature"][:] = 0
+    mesh.cell_data["material"][0][:] = 0
+    assert later.points.any() and later.fields["temperature"].any()
