@@ -405,7 +405,7 @@ fn one_who_watches_sends_no_long_messages() {
         // One that is read, and refused.
         watcher.send_text(&" ".repeat(60 << 10));
         let told = watcher.wait_for("error", |_| true);
-        assert!(told["message"].as_str().unwrap().contains("watches"), "{told}");
+        assert!(told["message"].as_str().unwrap().contains("for watching"), "{told}");
         watcher.send_unwelcome(Message::text(" ".repeat(70 << 10)));
         watcher.wait_for_end();
     }

@@ -99,7 +99,7 @@ def test_features_and_skeleton_are_those_of_the_program(tmp_path):
 
 
 def test_a_named_part_that_is_no_face_of_the_mesh_is_refused():
-    with pytest.raises(tombolo.MeshError, match="lid.* no face of any cell"):
+    with pytest.raises(tombolo.MeshError, match=r"lid.* no face of any cell"):
         shaper_of(faces={**FACES, "lid": np.array([[0, 1, len(POINTS) - 1]])})
 
 
