@@ -411,7 +411,7 @@ def test_features_of_vertices_are_whole_numbers():
         "version": 1,
         "pipelines": [{"name": "all", "stages": [{"surface": {}}, {"statistics": {"field": "p"}}]}],
     }
-    shown = mesh(fields={"p": np.zeros(27)}, vertex_features=np.arange(27) / 2)
+    shown = tombolo.Mesh(POINTS, {"tetra": TETS}, {"p": np.zeros(27)}, vertex_features=np.arange(27) / 2)
     told = pytest.raises(tombolo.MeshError, match=r"vertex_features: found 0\.5 at entry 1; expected a whole number")
     with tombolo.Adaptor(surface) as adaptor, told:
         adaptor.execute(0, 0.0, 0.1, shown)

@@ -20,7 +20,7 @@ def test_exit_codes_and_errors_are_those_of_the_program(tmp_path):
     assert done.returncode == 1 and "did you mean `pipelines`" in done.stderr
     file.write_text('{"version": 1}')
     assert program("check", str(file)).returncode == 0
-    assert program("bogus").returncode == 1
+    assert program("bogus").returncode == 2
     assert program("status").returncode == 2
     assert program("status", "http://127.0.0.1:1/?token=a").returncode == 2
 
