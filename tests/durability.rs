@@ -45,6 +45,13 @@ fn on_a_disk_that_is_nearly_full() -> (Small, Run) {
     (small, run)
 }
 
+/// Gives the files of a run another limit.
+fn limit(run: &Run, bytes: &str) {
+    let (process, size) = (run.process().to_string(), format!("--fsize={bytes}"));
+    let status = Command::new("prlimit").args(["--pid", &process, &size]).status();
+    assert!(status.is_ok_and(|status| status.success()));
+}
+
 /// An order for which that journal has no room.
 fn long() -> Value {
     let mut long = pinch(0.9);
@@ -62,6 +69,8 @@ fn the_report_of_a_run_says_that_its_journal_was_lost() {
     driver.wait_for("status", |status| status["paused"] == true);
     driver.send(&json!({"id": "long", "order": long()}));
     driver.wait_for("error", |error| error["id"] == "long");
+    // From now on not even a short line has room.
+    limit(&run, "65536:");
     driver.resume();
     let (_, text) = run.finish(PATIENCE);
     let report = small.read("report.json");
@@ -88,9 +97,7 @@ fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
     driver.wait_for("error", |error| error["id"] == "short");
 
     // There is room again.
-    let process = run.process().to_string();
-    let raised = Command::new("prlimit").args(["--pid", &process, "--fsize=unlimited:"]).status();
-    assert!(raised.is_ok_and(|status| status.success()));
+    limit(&run, "unlimited:");
     driver.wait_for("status", |status| status["journal_lost"].is_null());
     driver.send(&json!({"id": "again", "order": pinch(0.9)}));
     driver.wait_for("order", is("again", "applying"));
