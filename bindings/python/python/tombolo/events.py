@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time as clock
 from collections import deque
@@ -117,4 +118,6 @@ class Callbacks:
                 function(event)
             except BaseException:
                 # An exit would end this thread alone, and be told nowhere.
-                traceback.print_exc()
+                # Where nobody reads the errors of this program any more, callbacks go on.
+                with contextlib.suppress(OSError, ValueError):
+                    traceback.print_exc()
