@@ -39,13 +39,13 @@ pub enum ClientError {
         /// The reason why it is not trusted.
         reason: String,
     },
-    /// What answers there is encrypted, and the link is not.
+    /// The server at the link speaks TLS, and the link begins with `http://`.
     #[error("what answers on {address} is encrypted, and the link begins with http://")]
     Encrypted {
         /// The host and port.
         address: String,
     },
-    /// What answers there is not encrypted, and the link is.
+    /// The server at the link speaks no TLS, and the link begins with `https://`.
     #[error("what answers on {address} is not encrypted, and the link begins with https://")]
     NotEncrypted {
         /// The host and port.

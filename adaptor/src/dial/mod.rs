@@ -35,7 +35,7 @@ pub(crate) enum DialError {
     /// The certificate is not the one that was expected.
     #[error("its certificate: {0}")]
     Certificate(String),
-    /// What answers there is not encrypted.
+    /// The server speaks no TLS.
     #[error("what answers there is not encrypted")]
     NotEncrypted,
     /// The connection was closed before anything was answered.

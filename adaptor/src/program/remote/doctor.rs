@@ -45,7 +45,7 @@ pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
     tell("viewer", true, &viewer(&client), None)
 }
 
-/// What the client may do that has connected.
+/// The line that says whether the connected client steers, may steer or only watches.
 fn viewer(client: &Client) -> String {
     let hello = client.hello();
     if hello.as_ref().is_some_and(|hello| hello.recording.is_some()) {

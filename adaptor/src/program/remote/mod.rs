@@ -87,8 +87,8 @@ pub(crate) fn has(name: &str) -> bool {
     NAMES.contains(&name)
 }
 
-/// What is said where several files of links are given to one of these tasks, as a shell does for
-/// `*.link`; `arguments` begin with the name of the program.
+/// The error where a task is given several files of links, to which a shell expands `*.link`; `None`
+/// where it is not. `arguments` begin with the name of the program.
 pub(crate) fn several(arguments: &[OsString]) -> Option<String> {
     let (task, rest) = arguments.get(1..)?.split_first()?;
     if !task.to_str().is_some_and(has) {

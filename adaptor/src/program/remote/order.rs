@@ -205,7 +205,7 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
             bar.draw(report);
         }
         if has_ended {
-            // What is printed now stands below the bar.
+            // The bar ends its line before the outcome is printed.
             drop(bar.take());
         }
         match report.status {

@@ -107,7 +107,8 @@ impl Steerer {
     ///
     /// On one process orders are planned on other threads. On several ranks no other thread could
     /// speak with them, so that orders are planned when their turn comes, on all ranks in the same
-    /// call, and given up together ([`PlanTogether`]). Collective, as are [`Steerer::advance`] and whatever else makes plans.
+    /// call, and given up together ([`PlanTogether`]). Collective, as are [`Steerer::advance`] and
+    /// whatever else makes plans.
     pub(crate) fn new(
         shaper: Shaper,
         defaults: Defaults,
