@@ -2,7 +2,8 @@
 //!
 //! A [`Communicator`] is one process ([`Solo`]), the ranks of an MPI communicator, or a number of
 //! [`threads`] of one process; [`Counted`] counts what goes through one. [`agree`] is the way in
-//! which ranks fail together, [`Cancelling`] that in which they give up together. A [`Halo`] knows which entries of a list other ranks list too.
+//! which ranks fail together, [`Cancelling`] that in which they give up together. A [`Halo`] knows
+//! which entries of a list other ranks list too.
 
 mod alarm;
 mod cancelling;
