@@ -90,7 +90,8 @@ impl Communicator for Cancelling {
     }
 }
 
-#[cfg(test)]
+// Ranks are threads, which WebAssembly does not have.
+#[cfg(all(test, not(target_family = "wasm")))]
 mod tests {
     use super::*;
     use crate::communicator::{Counted, Reduction, threads};
