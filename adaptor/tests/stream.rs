@@ -492,8 +492,11 @@ fn a_paused_solver_waits_and_still_listens() {
     let helper = std::thread::spawn(move || {
         viewer.wait_for("status", |status| status["paused"] == true);
         viewer.send(&json!({"id": "meanwhile", "order": squeeze(0.2)}));
-        viewer
-            .wait_for("order", |order| order["id"] == "meanwhile" && order["status"] == "applying");
+        let is_planned = |order: &Value| {
+            order["id"] == "meanwhile"
+                && order["waits_for"].as_str().is_some_and(|reason| reason.contains("paused"))
+        };
+        viewer.wait_for("order", is_planned);
         std::thread::sleep(Duration::from_millis(200));
         viewer.send(&json!({"resume": {}}));
         viewer.wait_for("status", |status| status["paused"] == false);
