@@ -101,6 +101,8 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                     if !viewer.frames.is_empty() {
                         let mut decoder = Decoder::new();
                         assert!(viewer.frames.iter().all(|frame| decoder.decode(frame).is_ok()));
+                        // The wheel is kept for one that is gone without a word.
+                        viewer.send_message(Message::Close(None));
                         first = None;
                     }
                 }
