@@ -32,6 +32,9 @@ pub(crate) enum DialError {
     /// It is not reached.
     #[error("{0}")]
     Unreachable(String),
+    /// It does not speak TLS.
+    #[error("it answers without encryption; where it has none, its address begins with http://")]
+    NotEncrypted,
     /// The certificate is not the one that was expected.
     #[error("its certificate: {0}")]
     Certificate(String),
@@ -82,7 +85,12 @@ pub(crate) async fn encrypt(
     let name = ServerName::try_from(host.to_owned()).map_err(|error| wrong(error.to_string()))?;
     match timeout(CONNECT, TlsConnector::from(Arc::new(config)).connect(name, stream)).await {
         Ok(Ok(stream)) => Ok(Box::new(stream)),
-        Ok(Err(error)) => Err(wrong(error.to_string())),
+        Ok(Err(error)) => {
+            Err(match error.get_ref().and_then(|error| error.downcast_ref::<rustls::Error>()) {
+                Some(rustls::Error::InvalidMessage(_)) => DialError::NotEncrypted,
+                _ => wrong(error.to_string()),
+            })
+        }
         Err(_) => Err(DialError::Unreachable("it does not shake hands".into())),
     }
 }
