@@ -7,6 +7,7 @@ use std::{sync::Arc, time::Duration};
 
 use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::json;
+use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
     Adaptor, Parameter, Settings, Step,
     communicator::{Communicator, Counted, threads},
