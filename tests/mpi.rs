@@ -318,7 +318,7 @@ fn viewers_steer_three_ranks() {
     let mut second = Viewer::connect(&link).expect("another viewer connects");
     assert!(!second.frame().is_empty());
     // The wheel is kept for a moment for the one whose connection was lost.
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(std::time::Duration::from_secs(4));
     second.send(&json!({"drive": {}}));
     second.wait_for("hello", |hello| hello["role"] == "driver");
     second.send(&json!({"id": "amid", "order": pinch(0.9, 2)}));
