@@ -21,10 +21,6 @@ fn pinch(factor: f64) -> Value {
            "schedule": {"steps": 2, "every": {"steps": 1}}})
 }
 
-fn is(id: &'static str, status: &'static str) -> impl Fn(&Value) -> bool {
-    move |order| order["id"] == id && order["status"] == status
-}
-
 /// Lines of an earlier run, so many bytes of them.
 fn earlier(bytes: u64) -> String {
     let line = "{\"end\":{\"cycle\":1,\"time\":0.1}}\n";
@@ -100,7 +96,10 @@ fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
     limit(&run, "unlimited:");
     driver.wait_for("status", |status| status["journal_lost"].is_null());
     driver.send(&json!({"id": "again", "order": pinch(0.9)}));
-    driver.wait_for("order", is("again", "applying"));
+    driver.wait_for("order", |order| {
+        let reason = order["waits_for"].as_str().unwrap_or_default();
+        order["id"] == "again" && reason.contains("paused")
+    });
     driver.resume();
     let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");

@@ -10,7 +10,10 @@ use std::sync::{
 
 use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
-use tombolo::{OrderStatus, Settings, pipelines::language::parse_orders};
+use tombolo::{
+    OrderStatus, Settings,
+    pipelines::language::{parse_journal, parse_orders},
+};
 
 /// A run whose long orders take seconds.
 fn solver() -> Solver {
@@ -95,6 +98,109 @@ fn an_order_that_moves_the_mesh_is_not_cancelled() {
     let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "c");
     assert!(error["message"].as_str().unwrap().contains("moves the mesh already"), "{error}");
     solver.finish();
+}
+
+/// In a paused run an order is planned and begins nothing: it can be taken back as long as the pause
+/// lasts, and takes effect in the cycle of the pause.
+#[test]
+fn an_order_given_in_a_pause_is_taken_back_until_the_run_goes_on() {
+    for background in [true, false] {
+        let output = tempfile::tempdir().unwrap();
+        let more = format!(
+            r#"{{"journal": "journal.jsonl", "steering": {{"background": {background}}}, "#
+        );
+        let settings = || {
+            let config = config(&LINK_TO_ALL.replacen('{', &more, 1));
+            Settings { config, output: output.path().into(), ..Settings::default() }
+        };
+        let mut solver = Solver::new(settings());
+        let mut viewer = driven(&mut solver);
+        viewer.send(&json!({"id": "p", "pause": {}}));
+        let steered = std::thread::spawn(move || {
+            let waits = |viewer: &mut Viewer, id: &str, what: &str| {
+                viewer.wait_for("order", |order| {
+                    let reason = order["waits_for"].as_str().unwrap_or_default();
+                    order["id"] == id && reason.contains(what)
+                })
+            };
+            let paused = viewer.wait_for("done", |done| done["id"] == "p");
+            viewer.send(&json!({"id": "first", "order": squeeze(0.2)}));
+            let first = waits(&mut viewer, "first", "paused");
+            assert!(first["status"] == "computing" && first["cycle_applied"].is_null(), "{first}");
+            viewer.send(&json!({"id": "c", "cancel": {"order": "first"}}));
+            let cancelled = viewer.wait_for("order", has_status("first", "rejected"));
+            assert_eq!(cancelled["reason"], "cancelled by c1");
+            viewer.wait_for("done", |done| done["id"] == "c");
+            viewer.send(&json!({"id": "second", "order": squeeze(0.3)}));
+            waits(&mut viewer, "second", "paused");
+            viewer.send(&json!({"id": "late", "order": squeeze(0.05)}));
+            waits(&mut viewer, "late", "order second");
+            let mut third = json!({"id": "third", "order": squeeze(0.1)});
+            third["order"]["replaces"] = "second".into();
+            viewer.send(&third);
+            let replaced = viewer.wait_for("order", has_status("second", "rejected"));
+            assert_eq!(replaced["reason"], "replaced by order third by c1");
+            waits(&mut viewer, "third", "paused");
+            viewer.send(&json!({"resume": {}}));
+            (viewer, paused["cycle"].as_u64().unwrap())
+        });
+        solver.step_until("the third order", |solver| !solver.motions.is_empty());
+        let (mut viewer, paused) = steered.join().unwrap();
+        if background {
+            assert_eq!(solver.motions, [(paused, (1, 1), "third".to_owned())]);
+        }
+        if !has_been(&viewer, "late") {
+            solver.step_until_told(&mut viewer, "order", has_status("late", "applied"));
+        }
+        solver.steps(2);
+        let (motions, cycles, mesh) =
+            (solver.motions.clone(), solver.cycle, common::bits(&solver.mesh));
+        solver.finish();
+        let journal = std::fs::read_to_string(output.path().join("journal.jsonl")).unwrap();
+        for (id, has_begun) in [("first", 0), ("second", 0), ("third", 1), ("late", 1)] {
+            let begun = format!(r#""id":"{id}","status":"applied""#);
+            assert_eq!(journal.matches(&begun).count(), has_begun, "{id}: {journal}");
+            let refused = format!(r#""id":"{id}","status":"rejected""#);
+            assert_eq!(journal.matches(&refused).count(), 1 - has_begun, "{id}: {journal}");
+        }
+        let again = tempfile::tempdir().unwrap();
+        let replay = Some(parse_journal(&journal, "journal.jsonl").unwrap());
+        let output = again.path().into();
+        let mut replayed = Solver::new(Settings { replay, output, ..settings() });
+        replayed.steps(cycles);
+        assert_eq!(replayed.motions, motions);
+        assert!(common::bits(&replayed.mesh) == mesh, "{journal}");
+        replayed.finish();
+    }
+}
+
+fn has_been(viewer: &Viewer, applied: &str) -> bool {
+    let fits = has_status(applied, "applied");
+    viewer.seen.iter().any(|message| message.get("order").is_some_and(&fits))
+}
+
+#[test]
+fn a_stop_of_a_paused_run_begins_no_order() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    let mut viewer = driven(&mut solver);
+    viewer.send(&json!({"pause": {}}));
+    let steered = std::thread::spawn(move || {
+        viewer.wait_for("status", |status| status["paused"] == true);
+        viewer.send(&json!({"id": "held", "order": squeeze(0.2)}));
+        let is_paused = |order: &Value| {
+            order["waits_for"].as_str().is_some_and(|reason| reason.contains("paused"))
+        };
+        viewer.wait_for("order", is_paused);
+        viewer.send(&json!({"stop": {}}));
+        viewer
+    });
+    solver.step_until("the stop", |solver| solver.stopped);
+    drop(steered.join().unwrap());
+    solver.step();
+    assert!(solver.motions.is_empty(), "{:?}", solver.motions);
+    let order = &solver.finish().orders[0];
+    assert_eq!(order.status, OrderStatus::Rejected);
+    assert!(order.reason.as_deref().unwrap().contains("while it was paused"), "{order:?}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::{sync::Arc, time::Duration};
 
 use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::json;
+use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
     Adaptor, Parameter, Settings, Step,
     communicator::{Communicator, Counted, threads},
@@ -101,6 +102,8 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                     if !viewer.frames.is_empty() {
                         let mut decoder = Decoder::new();
                         assert!(viewer.frames.iter().all(|frame| decoder.decode(frame).is_ok()));
+                        // The wheel is kept for one that is gone without a word.
+                        viewer.send_message(Message::Close(None));
                         first = None;
                     }
                 }
@@ -131,6 +134,66 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
         outcomes[0].0 >= 40
             && outcomes[0].1.iter().any(|(_, name, value)| name == "inflow" && *value == 2.0)
     );
+}
+
+/// Gives orders in a pause: one is cancelled, one waits for too long, and one is carried out.
+fn steer_in_a_pause(viewer: &mut Viewer) {
+    let wait = |viewer: &mut Viewer, id: &str, status: &str, why: &str| {
+        viewer.wait_for("order", |order| {
+            let reasons = format!("{} {}", order["waits_for"], order["reason"]);
+            order["id"] == id && order["status"] == status && reasons.contains(why)
+        });
+    };
+    viewer.send(&json!({"pause": {}}));
+    viewer.wait_for("status", |status| status["paused"] == true);
+    viewer.send(&json!({"id": "first", "order": squeeze(0.3)}));
+    wait(viewer, "first", "computing", "paused");
+    viewer.send(&json!({"cancel": {"order": "first"}}));
+    wait(viewer, "first", "rejected", "cancelled by c1");
+    viewer.send(&json!({"id": "late", "order": squeeze(0.2)}));
+    wait(viewer, "late", "computing", "paused");
+    wait(viewer, "late", "rejected", "steering.deadline");
+    viewer.send(&json!({"id": "last", "order": squeeze(0.1)}));
+    wait(viewer, "last", "computing", "paused");
+    viewer.send(&json!({"resume": {}}));
+    wait(viewer, "last", "applied", "");
+    viewer.send(&json!({"stop": {}}));
+}
+
+#[test]
+fn orders_given_in_a_pause_begin_nothing_on_any_rank() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let outcomes = threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = part(&mesh, rank);
+        let mut config = config(LINK_TO_ALL);
+        config.steering.deadline = std::num::NonZeroU32::new(2).expect("not 0");
+        let communicator = Arc::new(ranks);
+        let mut adaptor =
+            Adaptor::initialize(Settings { config, communicator, ..Settings::default() })
+                .expect("initialize");
+        let steered = (rank == 0).then(|| {
+            let mut viewer = Viewer::connect(&adaptor);
+            std::thread::spawn(move || steer_in_a_pause(&mut viewer))
+        });
+        let speed = speed(&part);
+        let fields = [FieldView::vertex("speed", &speed)];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+        let mut moved = Vec::new();
+        for cycle in 0.. {
+            let steering = adaptor.execute(&step(cycle), &channels).expect("execute");
+            moved.extend(steering.motion.map(|motion| (cycle, motion.order.to_string())));
+            if steering.stop {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        steered.into_iter().for_each(|steered| steered.join().expect("all was told"));
+        adaptor.finalize().expect("finalize");
+        moved
+    });
+    assert!(outcomes.iter().all(|outcome| *outcome == outcomes[0]), "{outcomes:?}");
+    assert!(outcomes[0].len() == 1 && outcomes[0][0].1 == "last", "{outcomes:?}");
 }
 
 #[test]

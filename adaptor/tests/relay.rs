@@ -412,7 +412,9 @@ fn a_relay_that_is_killed_and_comes_back_is_found_again() {
     let (address, secret) = (place.parse().expect("an address"), token(link.trim()));
     stream["name"] = "nozzle".into();
     let run = Run::new(&stream, || names(address, &secret) == ["nozzle"]);
-    let watching = connect(&run.link).expect("connected");
+    // One that drove would have the wheel again.
+    let options = Options { watches: true, ..Options::default() };
+    let watching = Client::connect(&run.link, &options).expect("connected");
     drop(relay);
     run.goes_on();
     std::thread::sleep(Duration::from_millis(600));

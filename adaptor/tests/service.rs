@@ -157,6 +157,35 @@ fn an_order_that_waits_too_long_is_rejected() {
 }
 
 #[test]
+fn an_order_waits_no_longer_in_a_paused_run() {
+    let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    settings.config.steering.deadline = std::num::NonZeroU32::MIN;
+    let mut solver = Solver::new(settings);
+    solver.step();
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    viewer.send(&json!({"pause": {}}));
+    let steered = std::thread::spawn(move || {
+        viewer.wait_for("status", |status| status["paused"] == true);
+        viewer.send(&json!({"id": "first", "order": squeeze(0.1)}));
+        viewer.send(&json!({"id": "behind", "order": squeeze(0.2)}));
+        for id in ["first", "behind"] {
+            let late = viewer.wait_for("order", has_status(id, "rejected"));
+            assert!(late["reason"].as_str().unwrap().contains("steering.deadline"), "{late}");
+        }
+        viewer.send(&json!({"resume": {}}));
+        viewer.wait_for("status", |status| status["paused"] == false);
+        viewer
+    });
+    while !steered.is_finished() {
+        solver.step();
+    }
+    drop(steered.join().unwrap());
+    assert!(solver.motions.is_empty(), "{:?}", solver.motions);
+    solver.finish();
+}
+
+#[test]
 fn a_paused_run_that_nobody_can_resume_goes_on_where_that_is_wanted() {
     let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
     settings.config.steering.resume_after = Some(std::num::NonZeroU32::MIN);

@@ -482,6 +482,31 @@ fn a_driver_that_comes_back_has_the_wheel() {
     assert!(told["role"] == "driver" && told["client"] == name, "{told}");
 }
 
+/// Also where nobody else is there who may drive.
+#[test]
+fn the_wheel_is_kept_for_a_driver_that_is_lost_and_not_for_one_that_has_closed() {
+    let solver = Solver::with_config(LINK_TO_ALL);
+    let link = socket_url(&solver.adaptor);
+    let mut watcher = Viewer::try_connect(&format!("{link}&role=watch")).unwrap();
+    watcher.hello();
+    let mut driver = Viewer::connect(&solver.adaptor);
+    let hello = driver.hello();
+    let (name, back) = (hello["client"].as_str().unwrap(), hello["back"].as_str().unwrap());
+    watcher.wait_for("status", |status| status["viewers"] == 2 && status["driver"] == name);
+    watcher.seen.clear();
+    drop(driver);
+    watcher.wait_for("status", |status| status["viewers"] == 1);
+    let mut other = Viewer::connect(&solver.adaptor);
+    assert_eq!(other.hello()["role"], "watcher");
+    let mut again = Viewer::try_connect(&format!("{link}&client={name}&back={back}")).unwrap();
+    assert_eq!(again.hello()["role"], "driver");
+    drop(other);
+    watcher.seen.clear();
+    again.send_message(Message::Close(None));
+    watcher.wait_for("status", |status| status["driver"].is_null());
+    assert_eq!(Viewer::connect(&solver.adaptor).hello()["role"], "driver");
+}
+
 #[test]
 fn a_paused_solver_waits_and_still_listens() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
@@ -492,8 +517,11 @@ fn a_paused_solver_waits_and_still_listens() {
     let helper = std::thread::spawn(move || {
         viewer.wait_for("status", |status| status["paused"] == true);
         viewer.send(&json!({"id": "meanwhile", "order": squeeze(0.2)}));
-        viewer
-            .wait_for("order", |order| order["id"] == "meanwhile" && order["status"] == "applying");
+        let is_planned = |order: &Value| {
+            order["id"] == "meanwhile"
+                && order["waits_for"].as_str().is_some_and(|reason| reason.contains("paused"))
+        };
+        viewer.wait_for("order", is_planned);
         std::thread::sleep(Duration::from_millis(200));
         viewer.send(&json!({"resume": {}}));
         viewer.wait_for("status", |status| status["paused"] == false);

@@ -116,6 +116,10 @@ impl Adaptor {
         }
         self.make_ready();
         self.forecast();
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.set_paused(self.paused);
+            steerer.reject_overdue(moment);
+        }
         // A command that came after the solver had asked whether its mesh is looked at is for the next
         // call, which is lent the mesh whole.
         let looks = !self.waiting_changes.is_empty()

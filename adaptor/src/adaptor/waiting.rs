@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use tombolo_pipelines::extract::Channel;
 
-use super::Adaptor;
+use super::{Adaptor, SteeredMesh};
 use crate::step::Moment;
 
 /// How long a paused run waits between two calls of `look`.
@@ -59,12 +59,17 @@ impl Adaptor {
         let begun = Instant::now();
         while self.paused && !self.stopped {
             if self.communicator.rank() == 0 {
-                while !self.queue.wait(LOOK_PERIOD) {
+                while !self.queue.wait(LOOK_PERIOD) && !self.has_overdue() {
                     self.look.iter_mut().for_each(|look| look());
                 }
             }
             self.serve(moment, channels);
         }
         self.timing.paused.add(begun.elapsed());
+    }
+
+    /// Whether an order has waited for too long.
+    fn has_overdue(&self) -> bool {
+        matches!(&self.mesh, SteeredMesh::Steered(steerer, _) if steerer.is_overdue())
     }
 }

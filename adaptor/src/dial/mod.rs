@@ -32,6 +32,9 @@ pub(crate) enum DialError {
     /// It is not reached.
     #[error("{0}")]
     Unreachable(String),
+    /// It does not speak TLS.
+    #[error("it answers without encryption; where it has none, its address begins with http://")]
+    NotEncrypted,
     /// The certificate is not the one that was expected.
     #[error("its certificate: {0}")]
     Certificate(String),

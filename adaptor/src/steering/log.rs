@@ -283,7 +283,7 @@ impl Log {
             let Some(order) = state.order_mut(id) else { return };
             let before = order.status;
             change(order);
-            if order.status != OrderStatus::Accepted {
+            if !matches!(order.status, OrderStatus::Accepted | OrderStatus::Computing) {
                 order.waits_for = None;
             }
             (order.status != before).then(|| (order.status, order.reason.clone()))

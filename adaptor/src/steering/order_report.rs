@@ -17,7 +17,8 @@ pub struct OrderReport {
     pub status: OrderStatus,
     /// The cycle of the solver's last call when it came in.
     pub cycle_accepted: u64,
-    /// The reason why the order waits, as long as it is `accepted`.
+    /// The reason why the order waits, as long as it is `accepted`, or `computing` in a run that is
+    /// paused.
     pub waits_for: Option<String>,
     /// Why it was rejected, or what else there is to know.
     pub reason: Option<String>,

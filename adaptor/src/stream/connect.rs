@@ -2,6 +2,7 @@
 //! there for viewers.
 
 use std::{
+    collections::BTreeSet,
     sync::{Arc, Condvar, Mutex, PoisonError},
     time::Duration,
 };
@@ -51,6 +52,8 @@ const SILENT: Duration = Duration::from_secs(35);
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Connections for viewers that are being made at once.
 const DIALS: usize = 64;
+/// Reasons for which a relay is not reached that are told, each once, until it is.
+const REASONS: usize = 16;
 /// Bytes of the head of an answer.
 const HEAD: usize = 4096;
 /// Bytes of the address of a run.
@@ -128,7 +131,7 @@ impl Connect {
     /// the relay gives the run another name or address.
     pub(super) async fn keep(&self, entrance: &Entrance, renamed: impl Fn()) {
         let mut pause = FIRST_PAUSE;
-        let mut is_reported = false;
+        let mut reported = BTreeSet::new();
         loop {
             let Lost { reason, was_connected } = match self.join().await {
                 Ok((socket, attached)) => {
@@ -146,9 +149,10 @@ impl Connect {
             };
             lock(&self.state).is_connected = false;
             if was_connected {
-                (pause, is_reported) = (FIRST_PAUSE, false);
+                pause = FIRST_PAUSE;
+                reported.clear();
             }
-            if !std::mem::replace(&mut is_reported, true) {
+            if is_new(&mut reported, &reason) {
                 let (run, address) = (self.run.as_deref(), &self.relay);
                 tracing::warn!(
                     run,
@@ -258,6 +262,12 @@ impl Connect {
     }
 }
 
+/// Whether a reason is none of those that were told since the run was connected last, of which it is
+/// from now on.
+fn is_new(reported: &mut BTreeSet<String>, reason: &str) -> bool {
+    reported.len() < REASONS && reported.insert(reason.to_owned())
+}
+
 /// Makes a connection for a viewer.
 async fn carry(relay: &RelayAddress, secret: &Secret, open: &Open) -> Result<Accepted, String> {
     let failed = |error: std::io::Error| error.to_string();
@@ -353,6 +363,20 @@ mod tests {
             let pause = varied(Duration::from_secs(4));
             assert!((3.0..=5.0).contains(&pause.as_secs_f64()), "{pause:?}");
         }
+    }
+
+    #[test]
+    fn each_reason_is_told_once_until_the_relay_is_reached() {
+        let mut reported = BTreeSet::new();
+        assert!(is_new(&mut reported, "nobody listens there"));
+        assert!(!is_new(&mut reported, "nobody listens there"));
+        assert!(is_new(&mut reported, "it does not know the secret"));
+        assert!(!is_new(&mut reported, "nobody listens there"));
+        // A relay that says something else each time fills no log.
+        let told = (0..1000).filter(|it| is_new(&mut reported, &it.to_string())).count();
+        assert_eq!(told, REASONS - 2);
+        reported.clear();
+        assert!(is_new(&mut reported, "nobody listens there"));
     }
 
     #[test]

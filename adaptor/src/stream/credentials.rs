@@ -2,9 +2,11 @@
 //! that keys are traded for.
 
 use std::{
+    cmp::Reverse,
     collections::VecDeque,
     fs::{File, OpenOptions},
     io::{Read, Write},
+    net::IpAddr,
     path::Path,
     sync::{Arc, Mutex},
 };
@@ -27,7 +29,7 @@ const EXPECTED: &str = "expected a secret of 16 to 128 letters, digits, '-' or '
 /// ones make way.
 const KEYS: usize = 64;
 const KEYS_OF_VIEWER: usize = 8;
-/// Sessions that are known of each access; older ones make way.
+/// Sessions that are known of each access; others make way.
 const SESSIONS: usize = 128;
 /// The longest file of secrets that is read, in bytes.
 const FILE: u64 = 4096;
@@ -56,11 +58,13 @@ impl Access {
 pub(super) struct Holder {
     pub(super) access: Access,
     pub(super) allowance: Arc<Mutex<Allowance>>,
+    /// Of a session, which is in use as long as another has this too.
+    in_use: Arc<()>,
 }
 
 impl Holder {
     fn new(access: Access) -> Self {
-        Self { access, allowance: Arc::default() }
+        Self { access, allowance: Arc::default(), in_use: Arc::default() }
     }
 }
 
@@ -74,6 +78,15 @@ pub(super) enum Shown {
 struct Session {
     id: Secret,
     holder: Holder,
+    /// The address that it was begun from.
+    address: IpAddr,
+}
+
+impl Session {
+    /// Whether a connection shows its cookie.
+    fn is_in_use(&self) -> bool {
+        Arc::strong_count(&self.holder.in_use) > 1
+    }
 }
 
 /// A key to use once.
@@ -227,13 +240,22 @@ impl Credentials {
         issued.keys.remove(found).map(|known| known.access)
     }
 
-    /// Begins a session; its id is for the cookie.
-    pub(super) fn begin(&self, access: Access) -> Result<Secret, getrandom::Error> {
+    /// Begins a session for a browser at an address; its id is for the cookie. All who watch from one
+    /// address share an allowance, so that a new cookie is no way around it.
+    pub(super) fn begin(
+        &self,
+        access: Access,
+        address: IpAddr,
+    ) -> Result<Secret, getrandom::Error> {
         let id = Secret::random()?;
-        let mut issued = lock(&self.issued);
-        // Those who watch must not push out those who drive.
-        make_way(&mut issued.sessions, SESSIONS, |session| session.holder.access == access);
-        issued.sessions.push_back(Session { id: id.clone(), holder: Holder::new(access) });
+        let sessions = &mut lock(&self.issued).sessions;
+        let mut holder = Holder::new(access);
+        let is_near = |it: &&Session| it.holder.access == access && it.address == address;
+        if let (Access::Watch, Some(known)) = (access, sessions.iter().find(is_near)) {
+            holder.allowance = Arc::clone(&known.holder.allowance);
+        }
+        end_one(sessions, access);
+        sessions.push_back(Session { id: id.clone(), holder, address });
         Ok(id)
     }
 
@@ -291,6 +313,26 @@ impl Credentials {
 fn bearer_of(text: &str) -> Option<&str> {
     let (scheme, secret) = text.split_once(' ')?;
     scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim_start_matches(' '))
+}
+
+/// Ends a session where there are as many of this access as there may be: one that no connection uses,
+/// of the address that has the most, the oldest. So nobody who comes again and again ends those of others,
+/// and one who watches none of those who drive.
+fn end_one(sessions: &mut VecDeque<Session>, access: Access) {
+    let alike = |session: &&Session| session.holder.access == access;
+    if sessions.iter().filter(alike).count() < SESSIONS {
+        return;
+    }
+    let alike_from = |address: IpAddr| {
+        sessions.iter().filter(|it| it.holder.access == access && it.address == address).count()
+    };
+    let all = sessions.iter().enumerate().filter(|(_, session)| alike(session));
+    let first = all.max_by_key(|(index, session)| {
+        (!session.is_in_use(), alike_from(session.address), Reverse(*index))
+    });
+    if let Some(index) = first.map(|(index, _)| index) {
+        sessions.remove(index);
+    }
 }
 
 /// Makes room for one more of those that are `alike`, where there are so many already.
@@ -377,6 +419,8 @@ fn read(path: &Path) -> Result<SecretsFile, StreamError> {
 mod tests {
     use super::*;
 
+    const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+
     fn credentials() -> Credentials {
         Credentials::of(&StreamServer::default()).expect("secrets")
     }
@@ -406,7 +450,7 @@ mod tests {
             assert_eq!(access(&credentials, "/ws", &[("authorization", &bearer)]), Some(wanted));
             let bearer = format!("bearer  {secret}");
             assert_eq!(access(&credentials, "/ws", &[("authorization", &bearer)]), Some(wanted));
-            let id = credentials.begin(wanted).expect("a session");
+            let id = credentials.begin(wanted, HERE).expect("a session");
             let cookie = format!("other=1; tombolo-7070={}", id.as_str());
             let host = ("host", "localhost:7070");
             assert_eq!(access(&credentials, "/ws", &[host, ("cookie", &cookie)]), Some(wanted));
@@ -432,13 +476,47 @@ mod tests {
     #[test]
     fn sessions_are_bounded_and_watching_ones_push_no_driving_one_out() {
         let credentials = credentials();
-        let driving = credentials.begin(Access::Drive).expect("a session");
-        let watching = credentials.begin(Access::Watch).expect("a session");
+        let driving = credentials.begin(Access::Drive, HERE).expect("a session");
+        let watching = credentials.begin(Access::Watch, HERE).expect("a session");
         for _ in 0..SESSIONS {
-            credentials.begin(Access::Watch).expect("a session");
+            credentials.begin(Access::Watch, HERE).expect("a session");
         }
         assert!(credentials.session(driving.as_str()).is_some());
         assert!(credentials.session(watching.as_str()).is_none());
+    }
+
+    #[test]
+    fn one_who_watches_ends_no_session_of_another_address_and_none_in_use() {
+        let credentials = credentials();
+        let there = IpAddr::from([10, 0, 0, 2]);
+        let begin = |address| credentials.begin(Access::Watch, address).expect("a session");
+        let (used, unused, other) = (begin(HERE), begin(HERE), begin(there));
+        let connection = credentials.session(used.as_str()).expect("known");
+        (0..3 * SESSIONS).for_each(|_| drop(begin(HERE)));
+        let last = begin(HERE);
+        let is_known = |id: &Secret| credentials.session(id.as_str()).is_some();
+        assert!(is_known(&used) && is_known(&other) && is_known(&last) && !is_known(&unused));
+        assert_eq!(lock(&credentials.issued).sessions.len(), SESSIONS);
+        // Its connection has ended.
+        drop(connection);
+        begin(HERE);
+        assert!(!is_known(&used) && is_known(&other));
+    }
+
+    #[test]
+    fn a_new_cookie_is_no_new_allowance_for_those_who_watch() {
+        let credentials = credentials();
+        let holder = |access, address| {
+            let id = credentials.begin(access, address).expect("a session");
+            credentials.session(id.as_str()).expect("known")
+        };
+        let taken = |holder: &Holder| {
+            (0..1000).take_while(|_| lock(&holder.allowance).take(0)).count() > 20
+        };
+        assert!(taken(&holder(Access::Watch, HERE)));
+        assert!(!taken(&holder(Access::Watch, HERE)), "a new cookie is a way around it");
+        assert!(taken(&holder(Access::Watch, IpAddr::from([10, 0, 0, 2]))));
+        assert!(taken(&holder(Access::Drive, HERE)) && taken(&holder(Access::Drive, HERE)));
     }
 
     #[cfg(unix)]

@@ -190,7 +190,7 @@ impl Gate {
         headers: &HeaderMap,
         access: Access,
     ) -> Option<HeaderValue> {
-        let id = self.credentials.begin(access).ok()?;
+        let id = self.credentials.begin(access, connection.address()).ok()?;
         let name = self.credentials.cookie_name(headers);
         let is_encrypted = match connection.way() {
             Way::Direct => self.is_encrypted,

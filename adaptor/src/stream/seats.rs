@@ -40,12 +40,10 @@ impl HubState {
         self.wheel.left.remove(found).map(|(id, back, _)| (id, back))
     }
 
-    /// Gives a viewer its place, and the wheel where it is its own or nobody else may want it.
+    /// Gives a viewer its place, and the wheel where it is its own or free.
     pub(super) fn seat(&mut self, client: &Arc<Client>) {
-        let mut others = self.clients.values().filter(|other| other.id != client.id);
-        let is_alone = !others.any(|other| other.access == Access::Drive);
         let had_it = self.wheel.lost.is_some_and(|(_, driver)| driver == client.id);
-        let is_there = is_alone || had_it || self.wheel.is_free();
+        let is_there = had_it || self.wheel.is_free();
         if client.access == Access::Drive && self.wheel.driver.is_none() && is_there {
             self.take_wheel(client.id);
         }
@@ -94,6 +92,16 @@ impl Hub {
         state.wheel.left.push_back((client.id, client.back.clone(), client.access));
         state.status_dirty = true;
         state.together.left(client.id);
+    }
+
+    /// Takes note that a viewer ends its connection by itself: the wheel is not kept for it.
+    pub(super) fn let_go(&self, client: u64) {
+        let mut state = lock(&self.state);
+        if state.wheel.driver == Some(client) {
+            (state.wheel.driver, state.wheel.lost) = (None, None);
+            state.status_dirty = true;
+            state.together.changed();
+        }
     }
 
     /// Whether the run is paused and nobody is connected who could resume it.

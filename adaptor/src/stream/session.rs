@@ -166,7 +166,14 @@ async fn read(
     let client = seat.client;
     while let Some(Ok(message)) = stream.next().await {
         let message = match message {
-            Wire::Close(_) => return,
+            Wire::Close(close) => {
+                // A program that is done says nothing or 1000. A page that is left or loaded again
+                // says 1001, and may come back.
+                if close.is_none_or(|close| close.code == 1000) {
+                    seat.hub.let_go(client.id);
+                }
+                return;
+            }
             Wire::Ping(_) | Wire::Pong(_) => continue,
             // Not counted: there is no more of it than there are frames.
             Wire::Binary(bytes) if acknowledged(&bytes, client) => continue,

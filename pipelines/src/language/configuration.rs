@@ -96,9 +96,10 @@ pub struct StreamServer {
     #[schemars(with = "Option<String>")]
     pub listen: Option<Listen>,
     /// The relay to connect to, through which viewers reach the run: `HOST:PORT`, or
-    /// `HOST:PORT#sha256=FINGERPRINT` where its certificate is known by that. The relay's secret for
-    /// runs is `relay` in the file that `secrets` names, or `TOMBOLO_RELAY_SECRET`. While it is not
-    /// reached the run goes on, and it is tried again.
+    /// `HOST:PORT#sha256=FINGERPRINT` where its certificate is known by that, or
+    /// `http://HOST:PORT` without encryption, on this machine. The relay's secret for runs is
+    /// `relay` in the file that `secrets` names, or `TOMBOLO_RELAY_SECRET`. While it is not reached
+    /// the run goes on, and it is tried again.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub connect: Option<RelayAddress>,

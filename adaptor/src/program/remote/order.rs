@@ -246,6 +246,9 @@ pub(super) fn line(report: &OrderReport) -> String {
         (OrderStatus::Applied, Some(_)) => "applied, not followed",
         (OrderStatus::Rejected, _) => "rejected",
     };
+    if let (OrderStatus::Computing, Some(reason)) = (report.status, &report.waits_for) {
+        line += &format!(", waits for {reason}");
+    }
     if report.shapes > 0 {
         line += &format!(", shape {} of {}", report.shape, report.shapes);
     }

@@ -41,7 +41,7 @@ fn list(hello: &Hello, as_json: bool) -> Result<(), Failure> {
 /// Why an order waits and since when, in one line.
 fn line(order: &OrderReport) -> String {
     let why = match (order.status, &order.waits_for) {
-        (OrderStatus::Computing, _) => "its shapes are being found".into(),
+        (OrderStatus::Computing, None) => "its shapes are being found".into(),
         (_, Some(reason)) => format!("waits for {reason}"),
         (_, None) => "waits for its turn".into(),
     };

@@ -78,7 +78,11 @@ impl Steerer {
             }
         };
         if let Some(computing) = self.computing.take() {
-            end(&computing.id, "it was given up: the run ended before its shapes were known");
+            let reason = match computing.planned {
+                Some(_) => "the run ended while it was paused, before the order moved the mesh",
+                None => "it was given up: the run ended before its shapes were known",
+            };
+            end(&computing.id, reason);
         }
         for task in std::mem::take(&mut self.waiting) {
             end(&task.id, "the run ended before its turn came");

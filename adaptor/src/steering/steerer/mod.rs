@@ -5,6 +5,7 @@ mod recorded;
 mod saved;
 #[cfg(test)]
 mod tests;
+mod waiting;
 
 use std::{
     collections::VecDeque,
@@ -56,8 +57,19 @@ struct Computing {
     /// Whether the mesh stays where it is until the plan is made, because the one before started
     /// elsewhere.
     resting: bool,
+    /// The plan, which waits until the run is no longer paused.
+    planned: Option<Plan>,
+    background: bool,
     /// Given back when its turn has come.
-    _reservation: Option<Reservation>,
+    reservation: Option<Reservation>,
+}
+
+impl Computing {
+    /// The order, to be planned anew.
+    fn into_task(self) -> Task {
+        let Self { id, order, background, reservation, .. } = self;
+        Task { id, order, background, reservation }
+    }
 }
 
 /// The shape of one mesh and the orders that change it.
@@ -81,6 +93,8 @@ pub(crate) struct Steerer {
     waiting: VecDeque<Task>,
     /// How long an order of a viewer may wait.
     deadline: Duration,
+    /// Whether the run is paused: then plans are made, and no order begins to move the mesh.
+    paused: bool,
     computing: Option<Computing>,
     motion: Option<Motion>,
     /// The motion that was handed out last.
@@ -198,6 +212,7 @@ impl Steerer {
             here,
             waiting: VecDeque::new(),
             deadline: Duration::MAX,
+            paused: false,
             computing: None,
             motion: None,
             handed_out: MeshMotion {
@@ -357,8 +372,8 @@ impl Steerer {
         }
     }
 
-    /// Takes an order out of the queue, or one whose plan is being made, and returns its place in the
-    /// queue; the error says that it moves the mesh already. `None` where it is neither.
+    /// Takes an order out of the queue, or one that does not move the mesh yet, and returns its place
+    /// in the queue; the error says that it moves the mesh already. `None` where it is neither.
     pub(crate) fn withdraw(&mut self, id: &str) -> Option<Result<usize, String>> {
         if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
             self.waiting.remove(index);
@@ -382,10 +397,18 @@ impl Steerer {
     /// points only. On several ranks an order whose plan is given up waits again, in its place, and
     /// so do those behind it: the next call brings what it was given up for.
     pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
-        let mut changed = self.reject_overdue(moment);
+        let mut changed = false;
         loop {
             changed |= self.collect(moment, step_seconds);
-            if self.computing.is_some() {
+            if let Some(computing) = &self.computing {
+                if self.paused {
+                    return changed;
+                }
+                if computing.planned.is_some() {
+                    self.begin_planned(moment, step_seconds);
+                    changed = true;
+                    continue;
+                }
                 // An order that must take effect at this cycle waits for the one before it.
                 if self.waiting.iter().all(|task| task.background) {
                     return changed;
@@ -404,35 +427,6 @@ impl Steerer {
                 return changed;
             }
         }
-    }
-
-    /// Rejects orders that have waited for too long. Collective where any wait.
-    fn reject_overdue(&mut self, moment: Moment) -> bool {
-        if self.waiting.is_empty() {
-            return false;
-        }
-        let is_overdue = |task: &Task| {
-            task.reservation.as_ref().is_some_and(|reservation| reservation.age() > self.deadline)
-        };
-        // The clock of rank 0 counts.
-        let mut overdue: Vec<u8> =
-            self.waiting.iter().map(|task| is_overdue(task).into()).collect();
-        self.domain.communicator().broadcast(0, &mut overdue);
-        if overdue.iter().all(|&is_overdue| is_overdue == 0) {
-            return false;
-        }
-        let reason = format!(
-            "it has waited for more than {} seconds (steering.deadline)",
-            self.deadline.as_secs()
-        );
-        for (task, is_overdue) in std::mem::take(&mut self.waiting).into_iter().zip(overdue) {
-            if is_overdue == 1 {
-                self.log.reject(&task.id, moment, &reason.clone().into());
-            } else {
-                self.waiting.push_back(task);
-            }
-        }
-        true
     }
 
     /// Takes what the worker has finished.
@@ -455,7 +449,10 @@ impl Steerer {
                 return None;
             }
         };
-        self.log.update(&id, |order| order.status = OrderStatus::Computing);
+        self.log.update(&id, |order| {
+            order.status = OrderStatus::Computing;
+            order.waits_for = None;
+        });
         let defaults = self.defaults.clone();
         let mut computing = Computing {
             id,
@@ -465,7 +462,9 @@ impl Steerer {
             stack,
             asked,
             resting: false,
-            _reservation: reservation,
+            planned: None,
+            background,
+            reservation,
         };
         match &mut self.worker {
             Some(worker) if background => {
@@ -483,13 +482,12 @@ impl Steerer {
                         let plan = || lock(&self.planner).plan(&computing.asked);
                         let plan = together.run(id, plan);
                         if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
-                            let Computing { id, order, _reservation: reservation, .. } = computing;
-                            return Some(Task { id, order, background, reservation });
+                            return Some(computing.into_task());
                         }
                         plan
                     }
                 };
-                self.commit(computing, plan, moment, begun, step_seconds);
+                self.take_plan(computing, plan, moment, begun, step_seconds);
             }
         }
         None
@@ -503,7 +501,7 @@ impl Steerer {
             }
             Done::Gone => {
                 self.worker = None;
-                if let Some(computing) = self.computing.take() {
+                if let Some(computing) = self.computing.take_if(|asked| asked.planned.is_none()) {
                     let gone = Rejection::from("the thread that plans shapes has ended");
                     self.log.reject(&computing.id, moment, &gone);
                 }
@@ -513,13 +511,12 @@ impl Steerer {
                 let Some(computing) = self.computing.take_if(|asked| asked.number == number) else {
                     return;
                 };
-                let is_of_now = |plan: &Plan| Arc::ptr_eq(plan.start(), &self.here.points);
-                let is_stale = (*plan).as_ref().is_ok_and(|plan| !is_of_now(plan))
+                let is_stale = (*plan).as_ref().is_ok_and(|plan| !self.is_of_now(plan))
                     || computing.defaults != self.defaults;
                 if is_stale && self.worker.is_some() {
                     return self.plan_anew(computing, moment);
                 }
-                self.commit(computing, *plan, moment, Instant::now(), step_seconds);
+                self.take_plan(computing, *plan, moment, Instant::now(), step_seconds);
             }
         }
     }

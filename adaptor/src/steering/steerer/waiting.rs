@@ -1,0 +1,98 @@
+//! Orders that wait: for the end of a pause, and no longer than they may.
+
+use std::{sync::Arc, time::Instant};
+
+use tombolo_deform::shape::Plan;
+
+use super::{Computing, Steerer};
+use crate::{
+    steering::{Reservation, planner::Rejection},
+    step::Moment,
+};
+
+impl Steerer {
+    /// Says whether the run is paused. Until it goes on no order begins to move the mesh, so that each
+    /// can be taken back. It goes on in the cycle in which it was paused: the wait changes no cycle at
+    /// which an order takes effect.
+    pub(crate) fn set_paused(&mut self, paused: bool) {
+        self.paused = paused;
+    }
+
+    /// Makes a plan the motion under way, or keeps it as long as the run is paused. What is refused is
+    /// refused at once.
+    pub(super) fn take_plan(
+        &mut self,
+        computing: Computing,
+        plan: Result<Plan, Rejection>,
+        moment: Moment,
+        begun: Instant,
+        step_seconds: Option<f64>,
+    ) {
+        match plan {
+            Ok(plan) if self.paused => {
+                self.log.update(&computing.id, |order| {
+                    order.waits_for = Some("the run to go on, which is paused".into());
+                });
+                self.computing = Some(Computing { planned: Some(plan), ..computing });
+            }
+            plan => self.commit(computing, plan, moment, begun, step_seconds),
+        }
+    }
+
+    /// Begins the order whose plan was kept while the run was paused. Where the settings of orders or
+    /// the mesh have changed meanwhile it is planned anew.
+    pub(super) fn begin_planned(&mut self, moment: Moment, step_seconds: Option<f64>) {
+        let Some(mut computing) = self.computing.take() else { return };
+        match computing.planned.take() {
+            Some(plan) if computing.defaults == self.defaults && self.is_of_now(&plan) => {
+                self.commit(computing, Ok(plan), moment, Instant::now(), step_seconds);
+            }
+            _ => self.waiting.push_front(computing.into_task()),
+        }
+    }
+
+    /// Whether a plan begins at the shape that the mesh has.
+    pub(super) fn is_of_now(&self, plan: &Plan) -> bool {
+        Arc::ptr_eq(plan.start(), &self.here.points)
+    }
+
+    /// Whether an order has waited for too long, by the clock of this process.
+    pub(crate) fn is_overdue(&self) -> bool {
+        let mut waiting = self.may_be_overdue();
+        waiting.any(|(_, reservation)| self.is_too_old(reservation))
+    }
+
+    /// The orders that wait for their turn or for the end of a pause, and the room that they take.
+    fn may_be_overdue(&self) -> impl Iterator<Item = (&str, Option<&Reservation>)> {
+        let planned = self.computing.iter().filter(|computing| computing.planned.is_some());
+        let planned = planned.map(|it| (&*it.id, it.reservation.as_ref()));
+        planned.chain(self.waiting.iter().map(|task| (&*task.id, task.reservation.as_ref())))
+    }
+
+    fn is_too_old(&self, reservation: Option<&Reservation>) -> bool {
+        reservation.is_some_and(|reservation| reservation.age() > self.deadline)
+    }
+
+    /// Rejects orders that have waited for too long. Collective where any wait.
+    pub(crate) fn reject_overdue(&mut self, moment: Moment) {
+        let waiting = self.may_be_overdue();
+        // The clock of rank 0 counts.
+        let mut overdue: Vec<u8> =
+            waiting.map(|(_, reservation)| self.is_too_old(reservation).into()).collect();
+        if overdue.is_empty() {
+            return;
+        }
+        self.domain.communicator().broadcast(0, &mut overdue);
+        let waiting = self.may_be_overdue().zip(overdue).filter(|(_, is_overdue)| *is_overdue == 1);
+        let overdue: Vec<String> = waiting.map(|((id, _), _)| id.to_owned()).collect();
+        let reason = format!(
+            "it has waited for more than {} seconds (steering.deadline)",
+            self.deadline.as_secs()
+        );
+        for id in &overdue {
+            self.waiting.retain(|task| task.id != *id);
+            self.computing.take_if(|computing| computing.id == *id);
+            self.log.reject(id, moment, &reason.clone().into());
+        }
+    }
+}
