@@ -65,9 +65,6 @@ fn failed(link: &Link, error: DialError) -> ClientError {
         DialError::Unknown(reason) => ClientError::Unknown { host: link.host().into(), reason },
         DialError::Refused => ClientError::Refused { address },
         DialError::Unreachable(reason) => ClientError::Unreachable { address, reason },
-        error @ DialError::NotEncrypted => {
-            ClientError::Unreachable { address, reason: error.to_string() }
-        }
         DialError::Certificate(reason) => ClientError::Certificate { address, reason },
         DialError::NotEncrypted => ClientError::NotEncrypted { address },
         DialError::HungUp => ClientError::HungUp { address },

@@ -38,9 +38,6 @@ pub(crate) enum DialError {
     /// The certificate is not the one that was expected.
     #[error("its certificate: {0}")]
     Certificate(String),
-    /// The server speaks no TLS.
-    #[error("what answers there is not encrypted")]
-    NotEncrypted,
     /// The connection was closed before anything was answered.
     #[error("it closes the connection without an answer")]
     HungUp,
