@@ -1,6 +1,6 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
 //! shaping by hand, a first day, pipelines changed, a shape changed by two people, several people together,
-//! runs behind a relay and a proxy, and the end of a run.
+//! runs behind a relay and a proxy, the viewer in a page of others, and the end of a run.
 
 use std::path::Path;
 use std::process::Command;
@@ -99,12 +99,12 @@ fn a_first_day_in_a_browser() {
     watch("tasks.mjs", "bypass", "bypass-0");
 }
 
-/// A small nozzle that is streamed, with these options besides.
-fn small(options: &[&str]) -> (Small, Run) {
+/// A small nozzle that is streamed by these settings, with these options besides.
+fn small(stream: &Value, options: &[&str]) -> (Small, Run) {
     let small = Small::new();
     small.write(
         "pipelines.json",
-        &json!({"version": 1, "stream": {}, "steering": {"wait_for_viewer": true}, "pipelines": [
+        &json!({"version": 1, "stream": stream, "steering": {"wait_for_viewer": true}, "pipelines": [
             {"name": "surface", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
             {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
         ]}),
@@ -118,15 +118,29 @@ fn small(options: &[&str]) -> (Small, Run) {
 #[test]
 fn two_people_change_a_shape() {
     let _alone = alone();
-    let (_small, mut run) = small(&[]);
+    let (_small, mut run) = small(&json!({}), &[]);
     drive("shape.mjs", &mut run);
 }
 
 #[test]
 fn the_end_of_a_run_in_a_browser() {
     let _alone = alone();
-    let (_small, mut run) = small(&["--steps", "1500"]);
+    let (_small, mut run) = small(&json!({}), &["--steps", "1500"]);
     drive("ended.mjs", &mut run);
+}
+
+#[test]
+fn the_viewer_in_a_page_of_others_in_a_browser() {
+    let _alone = alone();
+    let [named, other] = free_ports();
+    let page = format!("http://localhost:{named}");
+    let (_small, run) = small(&json!({"embed": [page]}), &[]);
+    drive_at(
+        "framing.mjs",
+        &run.link().url(),
+        &run,
+        &[("TOMBOLO_PAGES", format!("{named} {other}"))],
+    );
 }
 
 /// The way of a site: the browser, a network that is cut for half a minute, a proxy with a certificate

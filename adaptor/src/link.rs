@@ -134,11 +134,17 @@ impl Link {
         format!("{scheme}://{}{port}{}/{path}", self.host, self.prefix)
     }
 
-    /// The address of the WebSocket, for a client that had a name before, and what it comes back by.
-    pub(crate) fn socket(&self, watches: bool, client: Option<&str>, back: Option<&str>) -> String {
+    /// The address of the WebSocket, for a client of a role that had a name before, and what it comes back
+    /// by.
+    pub(crate) fn socket(
+        &self,
+        role: Option<&str>,
+        client: Option<&str>,
+        back: Option<&str>,
+    ) -> String {
         let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
-        if watches {
-            client += "&role=watch";
+        if let Some(role) = role {
+            client += &format!("&role={role}");
         }
         if let Some(back) = back {
             client += &format!("&back={back}");
@@ -255,14 +261,14 @@ mod tests {
         let read = |text: &str| text.parse::<Link>();
         let link = read(" http://[::1]:7070/?token=abc\n").expect("a link");
         assert_eq!(
-            (link.name(), &*link.socket(false, None, None)),
+            (link.name(), &*link.socket(None, None, None)),
             ("::1", "ws://[::1]:7070/ws?token=abc")
         );
         assert_eq!(link.opened_by("?key=k"), "http://[::1]:7070/?key=k");
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
         assert_eq!(link.opened_by("?key=k"), "http://host/a/b/?key=k");
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
-        assert_eq!(link.socket(false, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
+        assert_eq!(link.socket(None, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
         assert!(!format!("{link:?}").contains("t-1"));
         let digits = "0A".repeat(32);
         let pinned = format!("https://host/?token=t-1#sha256={digits}");

@@ -21,7 +21,7 @@ use serde_json::Value;
 use tokio_tungstenite::tungstenite;
 use tombolo::{
     OrderStatus, Parameter, Report,
-    client::{Client, ClientError, Event, Link, Options, Received},
+    client::{Client, ClientError, Drives, Event, Link, Options, Received},
     pipelines::language::{Order, parse_valid},
 };
 
@@ -511,7 +511,7 @@ fn the_program_reaches_a_run() {
 #[test]
 fn the_program_waits_until_a_command_has_taken_effect() {
     let run = Run::new(LINK_TO_ALL);
-    let watches = Options { watches: true, ..Options::default() };
+    let watches = Options { drives: Drives::Never, ..Options::default() };
     let watching = Client::connect(&run.link, &watches).expect("connected");
     run.rest.store(4000, Ordering::Relaxed);
     let cycle = watching.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
@@ -545,7 +545,7 @@ fn the_program_lists_what_waits_and_replaces_it() {
         assert_eq!(code, 0, "{task} {arguments:?}: {said}");
         told[0]["order"]["id"].as_str().expect("a name").to_owned()
     };
-    let watches = Options { watches: true, ..Options::default() };
+    let watches = Options { drives: Drives::Never, ..Options::default() };
     let watching = Client::connect(&run.link, &watches).expect("connected");
     // All of it comes while the solver computes one step.
     let rest = 900_000;

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 use tokio_tungstenite::tungstenite::{self, WebSocket};
 use tombolo::{
     Settings,
-    client::{Client, ClientError, Event, Link, Options},
+    client::{Client, ClientError, Drives, Event, Link, Options},
     pipelines::language::Tls,
     stream::relay::{Relay, RelaySettings},
 };
@@ -413,7 +413,7 @@ fn a_relay_that_is_killed_and_comes_back_is_found_again() {
     stream["name"] = "nozzle".into();
     let run = Run::new(&stream, || names(address, &secret) == ["nozzle"]);
     // One that drove would have the wheel again.
-    let options = Options { watches: true, ..Options::default() };
+    let options = Options { drives: Drives::Never, ..Options::default() };
     let watching = Client::connect(&run.link, &options).expect("connected");
     drop(relay);
     run.goes_on();

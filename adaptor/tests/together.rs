@@ -12,7 +12,7 @@ use common::{LINK_TO_ALL, Solver, Viewer, config, socket_url};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Settings,
-    client::{Client, ClientError, Link, Options},
+    client::{Client, ClientError, Drives, Link, Options},
     pipelines::language::{LinkFor, StreamServer, parse_journal},
     play::Playback,
 };
@@ -94,13 +94,77 @@ fn a_program_gives_links_too() {
             address.strip_prefix(&format!("http://{}/", link.address())).expect("its address");
         assert!(opened(&solver.adaptor, path).0.contains("303"), "{address}");
     }
-    let watches = Options { watches: true, ..Options::default() };
+    let watches = Options { drives: Drives::Never, ..Options::default() };
     let watcher = Client::connect(&link, &watches).expect("connected");
     watcher.link_for(LinkFor::Watch, wait).expect("a link");
     let refused = watcher.link_for(LinkFor::Drive, wait);
     assert!(matches!(refused, Err(ClientError::Rejected { .. })), "{refused:?}");
     drop((client, watcher));
     solver.finish();
+}
+
+#[test]
+fn who_asks_first_leaves_the_wheel_to_others() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.step();
+    let link: Link = solver.adaptor.link().expect("a server").parse().expect("a link");
+    let wait = Duration::from_secs(60);
+    let on_request = Options { drives: Drives::OnRequest, ..Options::default() };
+    let script = Client::connect(&link, &on_request).expect("connected");
+    assert!(!script.drives(), "nobody drives, and it has not asked");
+    assert_eq!(script.hello().expect("told").may_drive, Some(true));
+    // One who comes to drive does, while the script is there.
+    let mut engineer = Viewer::connect(&solver.adaptor);
+    assert_eq!(engineer.hello()["role"], "driver");
+    let refused = script.drive(Duration::ZERO);
+    assert!(matches!(refused, Err(ClientError::NotDriver { .. })), "{refused:?}");
+    let asked = engineer.wait_for("wheel", |_| true);
+    engineer.send(&json!({"hand_over": {"to": asked["asked_by"]}}));
+    script.drive(wait).expect("handed over");
+    // Once nobody else is there it has the wheel as soon as it asks.
+    drop((engineer, script));
+    let script = Client::connect(&link, &on_request).expect("connected");
+    script.drive(wait).expect("free");
+    assert!(script.drives());
+    drop(script);
+    solver.finish();
+}
+
+#[test]
+fn pages_that_are_named_may_show_the_viewer_and_no_others() {
+    let headers = |settings: &str| {
+        let text = json!({"version": 1, "pipelines": [], "stream": serde_json::from_str::<Value>(settings).expect("JSON")});
+        let mut solver = Solver::with_config(&text.to_string());
+        solver.step();
+        let mut viewer = Viewer::connect(&solver.adaptor);
+        let named = viewer.hello()["embed"].clone();
+        let link: Link = solver.adaptor.link().expect("a server").parse().expect("a link");
+        let mut stream =
+            std::net::TcpStream::connect((link.host(), link.port())).expect("connected");
+        let request =
+            format!("GET / HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n\r\n", link.address());
+        stream.write_all(request.as_bytes()).expect("sent");
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).expect("read");
+        let answer = String::from_utf8_lossy(&answer).to_lowercase();
+        drop(viewer);
+        solver.finish();
+        let head = answer.split("\r\n\r\n").next().unwrap_or_default().to_owned();
+        (named, head)
+    };
+    let (named, head) = headers(r#"{"listen": "127.0.0.1:0"}"#);
+    assert_eq!(named, json!([]));
+    assert!(
+        head.contains("frame-ancestors 'none'") && head.contains("x-frame-options: deny"),
+        "{head}"
+    );
+    let (named, head) = headers(
+        r#"{"listen": "127.0.0.1:0", "embed": ["http://localhost:8888/", "https://Hub.example.org"]}"#,
+    );
+    assert_eq!(named, json!(["http://localhost:8888", "https://hub.example.org"]));
+    let expected =
+        "form-action 'none'; frame-ancestors http://localhost:8888 https://hub.example.org\r\n";
+    assert!(head.contains(expected) && !head.contains("x-frame-options"), "{head}");
 }
 
 #[test]

@@ -18,6 +18,8 @@ impl Adaptor {
         let (views, monitors) = (self.pipelines.views(), self.pipelines.monitors());
         let (views, monitors) = (Arc::clone(views), Arc::clone(monitors));
         let (changed, described) = (self.changed, Arc::clone(&self.described));
+        let stream = self.config.stream.as_ref();
+        let embed = stream.map(|stream| stream.embed.clone()).unwrap_or_default();
         let (parameters, defaults) = (self.parameters.all().to_vec(), self.defaults.clone());
         hub.describe(move || {
             let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
@@ -32,6 +34,7 @@ impl Adaptor {
                 "surface": described.surface,
                 "fields": list(&described.fields),
                 "parameters": parameters,
+                "embed": embed,
                 "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
             });
             if let Value::Object(description) = description { description } else { Map::new() }

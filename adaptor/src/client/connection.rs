@@ -17,7 +17,7 @@ use tokio_tungstenite::{
 use tombolo_pipelines::{encode::Decoder, limits::DOCUMENT};
 
 use super::{
-    ClientError, Event, Link, Options,
+    ClientError, Drives, Event, Link, Options,
     get::{is_encrypted, not_tombolo, open, refused, shown},
     state::Shared,
 };
@@ -55,7 +55,7 @@ enum Over {
 
 /// Keeps the connection until the run has ended, the owner lets go, or it cannot be made again.
 pub(super) async fn run(link: &Link, options: &Options, shared: &Arc<Shared>) -> ClientError {
-    let mut socket = match until_closing(shared, join(link, options.watches, shared)).await {
+    let mut socket = match until_closing(shared, join(link, options.drives, shared)).await {
         Some(Ok(socket)) => socket,
         Some(Err(error)) => return error,
         None => return ClientError::Closed,
@@ -98,7 +98,7 @@ async fn again(
     for _ in 0..options.attempts {
         sleep(pause).await;
         pause = pause.saturating_mul(2).min(options.longest_pause);
-        match join(link, options.watches, shared).await {
+        match join(link, options.drives, shared).await {
             Ok(socket) => return Ok(socket),
             // Another run listens there now.
             Err(
@@ -113,7 +113,7 @@ async fn again(
 }
 
 /// Connects and waits for the hello.
-async fn join(link: &Link, watches: bool, shared: &Shared) -> Result<Socket, ClientError> {
+async fn join(link: &Link, drives: Drives, shared: &Shared) -> Result<Socket, ClientError> {
     let before = shared.with(|state| state.hello.clone());
     let is_plain = |text: &str| text.chars().all(|c| c.is_ascii_alphanumeric());
     let name = before.as_ref().map(|hello| hello.client.as_str()).filter(|name| is_plain(name));
@@ -122,7 +122,7 @@ async fn join(link: &Link, watches: bool, shared: &Shared) -> Result<Socket, Cli
     let wrong = |found: String| not_tombolo(link, found);
     let late = || wrong(format!("no answer within {} seconds", HELLO.as_secs()));
     let mut request = link
-        .socket(watches, name, back)
+        .socket(drives.role(), name, back)
         .into_client_request()
         .map_err(|error| wrong(error.to_string()))?;
     if let Ok(value) = HeaderValue::from_str(&format!("Bearer {}", link.token())) {

@@ -65,8 +65,7 @@
 //! # What it does not
 //!
 //! What goes over a link with `http://` is not encrypted: see [`stream`](crate::stream). A client that connects to a run that nobody
-//! watches is the one that drives, as any first viewer is, unless it [only
-//! watches](Options::watches).
+//! drives is the one that drives, as any viewer is, unless its [options](Options::drives) say otherwise.
 
 mod connection;
 mod error;
@@ -107,14 +106,37 @@ const ASK_AGAIN: Duration = Duration::from_millis(300);
 /// How long closing may take: a server takes the message that is on its way, or is given up.
 const CLOSING: Duration = Duration::from_secs(12);
 
+/// When a client whose link is for driving is the one that drives. One that drove and lost its connection
+/// drives again when it is back in time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Drives {
+    /// From the start where nobody else does, and else once it [asks](Client::drive).
+    #[default]
+    IfFree,
+    /// Once it [asks](Client::drive).
+    OnRequest,
+    /// Never: it only watches.
+    Never,
+}
+
+impl Drives {
+    /// The word for it in the address of the WebSocket, if it has one.
+    pub(crate) fn role(self) -> Option<&'static str> {
+        match self {
+            Self::IfFree => None,
+            Self::OnRequest => Some("idle"),
+            Self::Never => Some("watch"),
+        }
+    }
+}
+
 /// How a client behaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
     /// Whether the frames of the live views are decoded and handed out; `false` if left out.
     pub views: bool,
-    /// Whether the client only watches, whatever its link is for: it never has the wheel, also where
-    /// nobody else is connected; `false` if left out.
-    pub watches: bool,
+    /// When the client is the one that drives; [`Drives::IfFree`] if left out.
+    pub drives: Drives,
     /// How often a lost connection is tried to be made again, one after the other; 0 for never.
     pub attempts: u32,
     /// The pause before the first attempt; each next one is twice as long.
@@ -128,7 +150,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             views: false,
-            watches: false,
+            drives: Drives::IfFree,
             attempts: 10,
             first_pause: Duration::from_millis(250),
             longest_pause: Duration::from_secs(10),

@@ -21,7 +21,7 @@ use super::{
     relay_messages::ACCESS,
 };
 use crate::lock::lock;
-use tombolo_pipelines::language::{JournalNote, RefusedRequest};
+use tombolo_pipelines::language::{Embedders, JournalNote, PageOrigin, RefusedRequest};
 
 /// How long nothing more is logged of an address once a refusal of it was.
 const QUIET: Duration = Duration::from_secs(60);
@@ -32,18 +32,35 @@ const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another 
 const USED: &str = "this link opens one browser, once: it has been used, or is of another run. In the browser that it opened, \
 go to this address without the key. For another browser take a link from the file that the run named when it began\n";
 
-const HEADERS: [(HeaderName, &str); 5] = [
+const HEADERS: [(HeaderName, &str); 3] = [
     (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
     (header::REFERRER_POLICY, "no-referrer"),
-    (header::X_FRAME_OPTIONS, "DENY"),
-    (
-        header::CONTENT_SECURITY_POLICY,
-        "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
-         img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self'; object-src 'none'; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    ),
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
+
+/// What a page of the viewer may load and do; which pages may show it inside of them comes behind.
+const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
+    img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self'; object-src 'none'; \
+    base-uri 'none'; form-action 'none'; frame-ancestors";
+
+/// Says which pages may show the viewer inside of them.
+#[derive(Debug)]
+pub(super) struct Framing {
+    policy: HeaderValue,
+    is_allowed: bool,
+}
+
+impl Framing {
+    pub(super) fn of(embedders: &Embedders) -> Self {
+        let pages: Vec<&str> = embedders.iter().map(PageOrigin::as_str).collect();
+        let pages = if pages.is_empty() { "'none'".into() } else { pages.join(" ") };
+        // An origin is made of letters that a header may have; were it not, no page may.
+        let policy = HeaderValue::from_str(&format!("{POLICY} {pages}"));
+        let is_allowed = policy.is_ok() && !embedders.is_empty();
+        let policy = policy.unwrap_or(HeaderValue::from_static("frame-ancestors 'none'"));
+        Self { policy, is_allowed }
+    }
+}
 
 /// Lets in to a server: under which names, and by which secrets.
 pub(super) struct Gate {
@@ -54,6 +71,7 @@ pub(super) struct Gate {
     /// The host of the address that a proxy before it has, if one was named.
     pub(super) public: Option<String>,
     pub(super) is_encrypted: bool,
+    pub(super) framing: Framing,
 }
 
 /// Refuses requests under a foreign name, from a foreign page or with a wrong secret, trades what a
@@ -75,7 +93,7 @@ pub(super) async fn guard(
         let address = connection.address().to_string();
         shared.commands.note(JournalNote::Refused(RefusedRequest { address }));
     }
-    add_headers(&mut response);
+    shared.gate.add_headers(&mut response);
     // The relay gives those who have shown a secret more time.
     if let (Way::Relayed { .. }, Some(access)) = (connection.way(), access) {
         response.headers_mut().insert(ACCESS, HeaderValue::from_static(access.name()));
@@ -83,17 +101,22 @@ pub(super) async fn guard(
     response
 }
 
-/// Puts the headers on an answer that keep it where it belongs.
-pub(super) fn add_headers(response: &mut Response) {
-    let headers = response.headers_mut();
-    for (name, value) in HEADERS {
-        headers.insert(name, HeaderValue::from_static(value));
-    }
-    // What holds data of the run, or a secret, is kept nowhere.
-    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
-}
-
 impl Gate {
+    /// Puts the headers on an answer that keep it where it belongs.
+    pub(super) fn add_headers(&self, response: &mut Response) {
+        let headers = response.headers_mut();
+        for (name, value) in HEADERS {
+            headers.insert(name, HeaderValue::from_static(value));
+        }
+        headers.insert(header::CONTENT_SECURITY_POLICY, self.framing.policy.clone());
+        // It knows no list of pages: it is left out where there is one.
+        if !self.framing.is_allowed {
+            headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
+        }
+        // What holds data of the run, or a secret, is kept nowhere.
+        headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    }
+
     /// Takes note of who asks, or has the answer for who goes no further.
     pub(super) fn admit(&self, connection: &Connection, request: &mut Request) -> Option<Response> {
         if let Some(answer) = self.foreign(connection, request) {

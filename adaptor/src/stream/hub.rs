@@ -397,6 +397,7 @@ impl Hub {
         &self,
         limit: usize,
         access: Access,
+        takes_wheel: bool,
         returning: Option<(&str, &str)>,
     ) -> Result<Arrival, getrandom::Error> {
         let mut state = lock(&self.state);
@@ -409,7 +410,7 @@ impl Hub {
         };
         let (views, is_known) = (state.view_numbers(), state.is_described());
         let client = Arc::new(Client::new(id, access, back, views, Pace::default(), is_known));
-        state.seat(&client);
+        state.seat(&client, takes_wheel);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
         drop(state);
         self.work.notify_one();

@@ -78,7 +78,7 @@ pub(crate) use surface::ReferenceSurface;
 use connect::Connect;
 use connection::Connection;
 use credentials::{Access, Credentials};
-use gate::{Gate, Refusals};
+use gate::{Framing, Gate, Refusals};
 use links::Links;
 use listener::Listener;
 use socket::{Listening, Place, Socket};
@@ -253,6 +253,7 @@ impl Server {
             is_loopback,
             public: None,
             is_encrypted: identity.is_some(),
+            framing: Framing::of(&settings.embed),
         };
         let shared = Shared {
             gate: Arc::new(gate),

@@ -62,8 +62,9 @@ async fn upgrade(
         Ok(upgrade) => upgrade,
         Err(rejection) => return rejection.into_response(),
     };
-    let only_watches = parameter(&uri, "role") == Some("watch");
-    let access = if only_watches { Access::Watch } else { holder.access };
+    let role = parameter(&uri, "role");
+    let access = if role == Some("watch") { Access::Watch } else { holder.access };
+    let takes_wheel = role != Some("idle");
     let most = match access {
         Access::Drive if shared.playback.is_none() => MESSAGE_SIZE,
         _ => WATCHED_SIZE,
@@ -76,7 +77,7 @@ async fn upgrade(
         }
         let returning = parameter(&uri, "client").zip(parameter(&uri, "back"));
         let limit = shared.limits.viewers.get() as usize;
-        let refusal = match shared.hub.join(limit, access, returning) {
+        let refusal = match shared.hub.join(limit, access, takes_wheel, returning) {
             Ok(Arrival::Client(client)) => {
                 let address = connection.address();
                 return session::serve(socket, client, holder, address, shared).await;

@@ -40,10 +40,10 @@ impl HubState {
         self.wheel.left.remove(found).map(|(id, back, _)| (id, back))
     }
 
-    /// Gives a viewer its place, and the wheel where it is its own or free.
-    pub(super) fn seat(&mut self, client: &Arc<Client>) {
+    /// Gives a viewer its seat, and the wheel where it is its own, or free and it takes it unasked.
+    pub(super) fn seat(&mut self, client: &Arc<Client>, takes_wheel: bool) {
         let had_it = self.wheel.lost.is_some_and(|(_, driver)| driver == client.id);
-        let is_there = had_it || self.wheel.is_free();
+        let is_there = had_it || takes_wheel && self.wheel.is_free();
         if client.access == Access::Drive && self.wheel.driver.is_none() && is_there {
             self.take_wheel(client.id);
         }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use numpy::{IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use tombolo::client::{self, Event, Link, LinkError, Options};
+use tombolo::client::{self, Drives, Event, Link, LinkError, Options};
 use tombolo::deform::surface::Surface;
 use tombolo::pipelines::encode::DecodedFrame;
 use tombolo::pipelines::extract::{Association, Field};
@@ -129,7 +129,9 @@ impl Client {
         attempts: u32,
     ) -> PyResult<Self> {
         let link: Link = link.parse().map_err(|error: LinkError| of_client(error.into()))?;
-        let options = Options { views, watches, attempts, ..Options::default() };
+        // A script that only reads must not keep others from driving: it has the wheel once it commands.
+        let drives = if watches { Drives::Never } else { Drives::OnRequest };
+        let options = Options { views, drives, attempts, ..Options::default() };
         let connect = || client::Client::connect(&link, &options).map_err(of_client);
         let client = ManuallyDrop::new(guarded(|| py.detach(connect))?);
         Ok(Self { client, process: std::process::id() })

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import tombolo
-from conftest import wait
+from conftest import CONFIGURATION, wait
 from tombolo.jupyter import Plot, _svg, viewer
 
 
@@ -91,7 +91,7 @@ class Page(HTMLParser):
 def test_a_run_shows_itself_in_a_notebook(solver, run):
     run.wait_for(lambda: run.monitors.get("health") and run.monitors["health"].rows and run.status.cycle > 5, 30)
     page = Page(run._repr_html_())
-    # No browser shows the viewer in a frame of a notebook.
+    # A run that names no page is in no frame: no browser would show it.
     assert not {"iframe", "script", "object", "embed"} & set(page.elements)
     assert page.elements["a"]["href"] == solver.link
     assert page.elements["a"]["target"] == "_blank" and "noopener" in page.elements["a"]["rel"].split()
@@ -111,6 +111,33 @@ def test_a_link_in_a_notebook_is_nothing_but_a_link():
     for link in ("unix:/run/user/tombolo.sock?token=secret", "javascript:alert(1)"):
         page = Page(viewer(link))
         assert not page.elements and "no browser" in page.seen and "secret" not in page.seen
+
+
+def test_a_run_that_names_the_notebook_shows_the_viewer_in_it():
+    pages = ["https://hub.example.org", "http://localhost:8888"]
+    page = Page(viewer("http://127.0.0.1:7070/?token=a", pages))
+    assert page.elements["iframe"]["src"] == "http://localhost:7070/?token=a"
+    assert page.elements["a"]["href"] == "http://127.0.0.1:7070/?token=a"
+    for link, pages, framed in [
+        ("https://hub.example.org/runs/a/?token=a", pages, "https://hub.example.org/runs/a/?token=a"),
+        ("https://relay.example.org/a/?token=a", pages, "https://relay.example.org/a/?token=a"),
+        ("http://localhost:7070/?token=a", ["http://[::1]:8888"], "http://[::1]:7070/?token=a"),
+        ("http://localhost:7070/?token=a", ["http://127.0.0.1"], "http://127.0.0.1:7070/?token=a"),
+        ("https://relay.example.org/?token=a", ["http://localhost:8888"], None),
+        ("http://node7:7070/?token=a", ["http://localhost:8888"], None),
+    ]:
+        assert Page(viewer(link, pages)).elements.get("iframe", {}).get("src") == framed, (link, pages)
+
+
+def test_a_run_in_a_notebook_is_in_a_frame_where_it_says_so(begin):
+    stream = {"listen": "127.0.0.1:0", "embed": ["http://localhost:8888"]}
+    solver = begin({**CONFIGURATION, "stream": stream})
+    with tombolo.connect(solver.link) as run:
+        frame = Page(run._repr_html_()).elements["iframe"]
+        assert frame["src"] == solver.link.replace("127.0.0.1", "localhost")
+        run.stop(timeout=30)
+        run.wait(30)
+        assert "iframe" not in Page(run._repr_html_()).elements
 
 
 def test_a_monitor_is_plotted(run):

@@ -212,6 +212,15 @@ def test_one_drives_and_others_watch(solver, run):
         assert watcher.wait_for_view("midplane", timeout=30).cycle >= 0
 
 
+def test_one_who_only_looks_keeps_nobody_from_steering(solver):
+    with tombolo.connect(solver.link) as looks, tombolo.connect(solver.link) as steers:
+        assert looks.status.cycle >= 0 and not looks.drives
+        steers.set("heating", 2, timeout=30)
+        assert steers.drives and not looks.drives
+        with pytest.raises(tombolo.NotDriverError):
+            looks.set("heating", 3, timeout=30)
+
+
 def test_a_closed_run_gives_up_the_wheel_though_it_is_still_held(solver):
     first = tombolo.connect(solver.link)
     first.drive()

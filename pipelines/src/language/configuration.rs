@@ -11,7 +11,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::pipeline::{Due, Pipeline};
-use super::relay_address::{RelayAddress, RunName};
+use super::{
+    page_origin::Embedders,
+    relay_address::{RelayAddress, RunName},
+};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -125,6 +128,12 @@ pub struct StreamServer {
     /// `TOMBOLO_WATCHING_SECRET` go before it; those that nothing gives are made for each run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub secrets: Option<String>,
+    /// The pages that may show the viewer inside of them, such as a notebook's: `http://HOST:PORT` or
+    /// `https://HOST:PORT` of each, 16 at most. What lies over the viewer in such a page can mislead whoever
+    /// clicks there. Left out, no page may.
+    #[serde(skip_serializing_if = "Embedders::is_empty")]
+    #[schemars(with = "Vec<String>")]
+    pub embed: Embedders,
     /// How many may connect, and how long a driver may be silent.
     pub limits: StreamLimits,
 }

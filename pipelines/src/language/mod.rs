@@ -41,6 +41,7 @@ mod message;
 mod monitors;
 mod order;
 mod orders_text;
+mod page_origin;
 mod parameter;
 mod parse;
 mod pipeline;
@@ -88,6 +89,7 @@ pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Cancel, Change, Command, Order, Question};
 pub use orders_text::parse_orders;
+pub use page_origin::{Embedders, PageOrigin};
 pub use parameter::Parameter;
 pub use parse::{ReadError, Validate, locate, parse_json, parse_valid, read_text, text};
 pub use pipeline::{AgainAfter, At, Budget, Cadence, Due, Pipeline};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::client::{Client, ClientError, Link, Options};
+use crate::client::{Client, ClientError, Drives, Link, Options};
 use serde_json::json;
 
 use super::{Target, target::TargetError};
@@ -29,7 +29,7 @@ pub(crate) fn doctor(target: &Target) -> Result<(), Failure> {
             return Err(Failure::Unreached);
         }
     };
-    let options = Options { attempts: 0, ..Options::default() };
+    let options = Options { attempts: 0, drives: Drives::OnRequest, ..Options::default() };
     let connected = Client::connect(&link, &options);
     let wrong = connected.as_ref().err().map(|error| (step(error), error));
     for (number, name) in STEPS.iter().enumerate() {
@@ -51,15 +51,13 @@ fn viewer(client: &Client) -> String {
     if hello.as_ref().is_some_and(|hello| hello.recording.is_some()) {
         return "this is a recording, of which nothing can be ordered".into();
     }
-    let role = if client.drives() {
-        "it may steer".into()
-    } else if hello.as_ref().is_some_and(|hello| hello.may_drive == Some(false)) {
+    let role = if hello.as_ref().is_some_and(|hello| hello.may_drive == Some(false)) {
         "it watches, because the link is for watching".into()
     } else {
         let status = client.wait_for_status(STATUS, |_| true).ok();
         match status.as_ref().and_then(|status| status.driver.as_ref()) {
             Some(driver) => format!("it watches, because {driver} drives"),
-            None => "it watches for now: the wheel is kept for a driver that was lost".into(),
+            None => "it may steer".into(),
         }
     };
     let name = hello.map_or_else(String::new, |hello| hello.client.clone());

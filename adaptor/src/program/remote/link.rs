@@ -1,6 +1,6 @@
 //! `tombolo link`.
 
-use crate::pipelines::language::LinkFor;
+use crate::{client::Drives, pipelines::language::LinkFor};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -25,11 +25,11 @@ enum Rights {
 }
 
 pub(crate) fn link(options: &Options) -> Result<(), Failure> {
-    let (rights, watches) = match options.rights {
-        Rights::Watch => (LinkFor::Watch, true),
-        Rights::Drive => (LinkFor::Drive, false),
+    let (rights, drives) = match options.rights {
+        Rights::Watch => (LinkFor::Watch, Drives::Never),
+        Rights::Drive => (LinkFor::Drive, Drives::OnRequest),
     };
-    let client = connect(&options.target, watches)?;
+    let client = connect(&options.target, drives)?;
     let address = client.link_for(rights, ANSWER).map_err(failed)?;
     if options.target.json {
         return say(json!({"link": {"for": rights, "address": address}}));

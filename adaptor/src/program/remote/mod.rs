@@ -11,7 +11,7 @@ mod watch;
 
 use std::{ffi::OsString, path::Path, time::Duration};
 
-use crate::client::{Client, ClientError, Event, Options};
+use crate::client::{Client, ClientError, Drives, Event, Options};
 use clap::Subcommand;
 use serde_json::json;
 
@@ -144,14 +144,14 @@ pub(crate) fn failed(error: ClientError) -> Failure {
     }
 }
 
-pub(crate) fn connect(target: &Target, watches: bool) -> Result<Client, Failure> {
+pub(crate) fn connect(target: &Target, drives: Drives) -> Result<Client, Failure> {
     let link = target.link().map_err(|error| Failure::NoConnection(error.to_string()))?;
-    Client::connect(&link, &Options { watches, ..Options::default() }).map_err(failed)
+    Client::connect(&link, &Options { drives, ..Options::default() }).map_err(failed)
 }
 
 /// Connects and takes the wheel.
 pub(crate) fn steer(target: &Target) -> Result<Client, Failure> {
-    let client = connect(target, false)?;
+    let client = connect(target, Drives::OnRequest)?;
     client.drive(WHEEL).map_err(failed)?;
     Ok(client)
 }

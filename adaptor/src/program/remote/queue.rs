@@ -2,7 +2,7 @@
 
 use crate::{
     OrderReport, OrderStatus,
-    client::{Event, Hello},
+    client::{Drives, Event, Hello},
 };
 
 use super::{ANSWER, Target, connect, failed};
@@ -10,7 +10,7 @@ use crate::program::{Failure, say};
 
 /// Lists the orders that have not begun to move the mesh, in their order.
 pub(crate) fn queue(target: &Target) -> Result<(), Failure> {
-    let client = connect(target, true)?;
+    let client = connect(target, Drives::Never)?;
     loop {
         let Some(received) = client.next(ANSWER).map_err(failed)? else {
             return Err(Failure::Wrong("the run tells nothing".into()));

@@ -1,12 +1,12 @@
 //! `tombolo status`.
 
-use crate::client::{Client, Event, Hello, Status};
+use crate::client::{Client, Drives, Event, Hello, Status};
 
 use super::{ANSWER, Target, connect, failed};
 use crate::program::{Failure, say};
 
 pub(crate) fn status(target: &Target) -> Result<(), Failure> {
-    let client = connect(target, true)?;
+    let client = connect(target, Drives::Never)?;
     loop {
         let Some(told) = client.next(ANSWER).map_err(failed)? else {
             return Err(Failure::Wrong("the run tells nothing".into()));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::client::{ClientError, Event};
+use crate::client::{ClientError, Drives, Event};
 use clap::{Args, ValueEnum};
 
 use super::{Target, connect, failed, order, status};
@@ -30,7 +30,7 @@ enum Until {
 }
 
 pub(crate) fn watch(options: &Options) -> Result<(), Failure> {
-    let client = connect(&options.target, true)?;
+    let client = connect(&options.target, Drives::Never)?;
     loop {
         let told = match client.next(WAIT) {
             Ok(Some(told)) => told,

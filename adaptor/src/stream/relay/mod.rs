@@ -33,7 +33,7 @@ use axum::{
     routing::get,
 };
 use tokio::sync::oneshot;
-use tombolo_pipelines::language::Tls;
+use tombolo_pipelines::language::{Embedders, Tls};
 
 use super::{
     connection::Connection,
@@ -185,6 +185,8 @@ impl Relay {
                 is_loopback: !is_open,
                 public: settings.public.as_deref().and_then(host_of).map(str::to_owned),
                 is_encrypted: identity.is_some(),
+                // Of its own pages; those of a run have what the run says.
+                framing: gate::Framing::of(&Embedders::default()),
             },
             credentials,
             runs: Runs::new(settings.connections.get() as usize),
@@ -332,7 +334,7 @@ async fn guard(
     };
     if is_own || is_answered {
         relay.gate.log_refusal(None, &connection, &response);
-        gate::add_headers(&mut response);
+        relay.gate.add_headers(&mut response);
     }
     response
 }

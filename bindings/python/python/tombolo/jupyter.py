@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import html
 import time as clock
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Optional
+from urllib.parse import urlsplit, urlunsplit
 
 import numpy as np
 
@@ -20,6 +22,10 @@ __all__ = ["Plot", "summary", "viewer"]
 #: Size of a plot and its margins, in pixels; the most points that its line is drawn with.
 _WIDTH, _HEIGHT, _LEFT, _REST = 640, 220, 76, 28
 _POINTS = 2000
+#: Height of the viewer in a frame, in pixels.
+_FRAME = 720
+#: The names of this machine.
+_LOOPBACK = ("localhost", "127.0.0.1", "::1")
 #: Seconds between two drawings of a plot that lives.
 _PAUSE = 0.5
 #: How long a monitor that nobody knows may take to be announced, in seconds.
@@ -28,32 +34,60 @@ _ANNOUNCED = 2.0
 _STEP = ("cycle", "time")
 
 
-def viewer(link: str) -> str:
-    """A link as HTML that opens the viewer of a run in a new tab.
+def viewer(link: str, pages: Sequence[str] = ()) -> str:
+    """The viewer of a run as HTML: in a frame, and as a link that opens it in a new tab.
 
-    The viewer is not shown in the notebook itself: its pages refuse to be in a frame, so that no other page can lay
-    itself over them (docs/security.md).
+    There is a frame where the run says that pages of a notebook's address may show the viewer inside of them
+    (``stream.embed``), and a link alone where it names none: no browser would show it then.
 
     Parameters
     ----------
     link : str
         The run's link. It is in the HTML, though not in the text that is seen, and with it in the notebook's file:
-        whoever reads that can do what it is for while the run goes on.
+        whoever reads that can do what the link is for while the run goes on.
+    pages : sequence of str
+        The addresses that the run names, such as ``http://localhost:8888``. Where the link leads to this machine
+        the frame has the name that the first of them gives it (``localhost``, ``127.0.0.1``): a browser that shows the
+        notebook under another name than the viewer keeps the viewer's cookie back.
 
     Examples
     --------
     >>> from tombolo.jupyter import viewer
     >>> print(viewer("http://127.0.0.1:7070/?token=a"))
     <a href="http://127.0.0.1:7070/?token=a" target="_blank" rel="noopener noreferrer">Open the viewer in a new tab</a>
+    >>> print(viewer("http://127.0.0.1:7070/?token=a", ["http://localhost:8888"]).split(">")[0] + ">")
+    <iframe src="http://localhost:7070/?token=a" width="100%" height="720" allow="fullscreen; clipboard-write">
     """
     if not link.startswith(("http://", "https://")):
         return "The run listens on a socket at a path, which no browser opens."
+    framed = _framed(link, pages)
+    frame = ""
+    if framed is not None:
+        source = html.escape(framed, quote=True)
+        frame = f'<iframe src="{source}" width="100%" height="{_FRAME}" allow="fullscreen; clipboard-write"></iframe>'
     address = html.escape(link, quote=True)
-    return f'<a href="{address}" target="_blank" rel="noopener noreferrer">Open the viewer in a new tab</a>'
+    return f'{frame}<a href="{address}" target="_blank" rel="noopener noreferrer">Open the viewer in a new tab</a>'
+
+
+def _framed(link: str, pages: Sequence[str]) -> Optional[str]:
+    """The address of the viewer in a frame of the first of some pages that a browser shows it in; None for none."""
+    parts = urlsplit(link)
+    for page in pages:
+        of_page = urlsplit(page)
+        # A page that is encrypted has no frame that is not, and the other way round no cookie.
+        if of_page.scheme != parts.scheme or of_page.hostname is None or parts.hostname is None:
+            continue
+        if of_page.hostname in _LOOPBACK and parts.hostname in _LOOPBACK:
+            place = of_page.netloc.rsplit(":", 1)[0] if of_page.port is not None else of_page.netloc
+            port = "" if parts.port is None else f":{parts.port}"
+            return urlunsplit(parts._replace(netloc=f"{place}{port}"))
+        if (of_page.hostname in _LOOPBACK) == (parts.hostname in _LOOPBACK):
+            return link
+    return None
 
 
 def summary(run: Run) -> str:
-    """How far a run is, the newest values of its monitors, and a link to its viewer, as HTML.
+    """How far a run is, the newest values of its monitors, and its viewer, as HTML.
 
     It is what a notebook shows of a `Run`. It does not wait, and does not change any more: `Plot.live` does.
 
@@ -77,7 +111,8 @@ def summary(run: Run) -> str:
         f'<td style="text-align: left">{html.escape(text)}</td></tr>'
         for name, text in rows
     )
-    return f"<table>{cells}</table>{viewer(run.link)}"
+    pages = run._state.hello.get("embed", ()) if run.connected else ()
+    return f"<table>{cells}</table>{viewer(run.link, pages)}"
 
 
 def _state(run: Run) -> str:
