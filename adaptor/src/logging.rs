@@ -18,7 +18,7 @@
 //! | `reason` | why something was not done |
 //!
 //! A mistake is a warning or an error; the life of orders, what was commanded, who watches and what
-//! was written are told at `INFO` and `DEBUG`. On several ranks rank 0 speaks for all, but for one
+//! was written are told at `INFO` and `DEBUG`. On several ranks only rank 0 tells them, but for one
 //! that ends the job.
 //!
 //! A host that has set a subscriber of `tracing` has all events there. One that has set a logger of

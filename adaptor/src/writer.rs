@@ -109,6 +109,10 @@ impl Writer {
             std::thread::sleep(Duration::from_millis(1));
             sent = tasks.try_send(task);
         }
+        // The thread may have ended, which is told where files are written.
+        if sent.is_err() {
+            return;
+        }
         // It is never sent: the thread lets go of it.
         let _ = answered.recv_timeout(until.saturating_duration_since(Instant::now()));
     }

@@ -239,6 +239,43 @@ fn a_stop_gives_shapes_up_where_nobody_watches() {
 }
 
 #[test]
+fn a_stop_of_a_list_begins_no_order_of_its_step() {
+    let orders = json!([
+        {"at": {"cycle": 1}, "order": long(0.3)},
+        {"at": {"cycle": 1}, "stop": {}}
+    ]);
+    let orders = parse_orders(&orders.to_string(), "orders.json").unwrap();
+    let mut solver = Solver::of_box([24, 24, 24], Settings { orders, ..Settings::default() });
+    solver.steps(2);
+    assert!(solver.stopped && solver.motions.is_empty());
+    let order = &solver.finish().orders[0];
+    assert_eq!(order.status, OrderStatus::Rejected);
+    assert!(order.reason.as_deref().unwrap().contains("given up"), "{order:?}");
+}
+
+#[test]
+fn orders_of_a_mesh_that_was_replaced_have_an_outcome() {
+    let orders = json!([
+        {"at": {"cycle": 1}, "order": {"schedule": {"steps": 8}, "edits": squeeze(0.2)["edits"]}},
+        {"at": {"cycle": 2}, "order": squeeze(0.1)}
+    ]);
+    let orders = parse_orders(&orders.to_string(), "orders.json").unwrap();
+    let mut solver = Solver::new(Settings { orders, ..Settings::default() });
+    solver.steps(4);
+    solver.adaptor.release_shape("the solver refines its mesh");
+    solver.steps(2);
+    let report = solver.finish();
+    let outcomes: Vec<(OrderStatus, &str)> = report
+        .orders
+        .iter()
+        .map(|order| (order.status, order.reason.as_deref().unwrap_or_default()))
+        .collect();
+    let [(first, ended), (second, rejected)] = outcomes[..] else { panic!("{outcomes:?}") };
+    assert!(first == OrderStatus::Applied && ended.contains("of 8: the solver refines"), "{ended}");
+    assert_eq!((second, rejected), (OrderStatus::Rejected, "the solver refines its mesh"));
+}
+
+#[test]
 fn a_host_is_called_while_its_solver_waits() {
     let pause = parse_orders(r#"[{"at": {"cycle": 0}, "pause": {}}]"#, "orders.json").unwrap();
     for (steering, orders) in [("{}", pause), (r#"{"wait_for_viewer": true}"#, Vec::new())] {

@@ -384,6 +384,9 @@ fn a_replay_is_watched_and_not_steered() {
     viewer.send(&json!({"id": "a", "order": squeeze(0.2)}));
     let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "a");
     assert!(error["message"].as_str().unwrap().contains("replays a journal"), "{error}");
+    viewer.send(&json!({"id": "b", "cancel": {"order": "a"}}));
+    let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "b");
+    assert!(error["message"].as_str().unwrap().contains("replays a journal"), "{error}");
     viewer.send(&json!({"stop": {}}));
     solver.step_until("the stop", |solver| solver.stopped);
     // The pipeline of this configuration has given orders, which no journal holds.

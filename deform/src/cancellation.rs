@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether work under way is to be given up. Its clones are the same; any thread may ask.
+/// Whether work under way is to be given up. Clones share it; any thread may ask.
 ///
 /// Work that looks at it stops at its next look, and leaves nothing half-done. In the iterations of a
 /// solve, of an untangling, in its line searches, in sweeps and in the checks of a mesh that is some
 /// milliseconds away, on a mesh of a million cells. A step of a set-up is finished first: the order
 /// of the cells, an assembly, the levels of multigrid, a factor.
 ///
-/// Ranks stop at the same look: see [`Cancelling`](crate::communicator::Cancelling).
+/// Ranks stop at the same look, behind the next reduction in which all have heard of it; in the checks
+/// of a mesh that is after some million cells. See [`Cancelling`](crate::communicator::Cancelling).
 ///
 /// ```
 /// use tombolo_deform::cancellation::Cancellation;
@@ -48,7 +49,7 @@ impl Cancellation {
         Self { agreed: Arc::default(), ..Self::default() }
     }
 
-    /// The same for what this rank does alone, which may stop as soon as it is asked to.
+    /// The cancellation of work that this rank does alone, which may stop as soon as it is asked to.
     pub(crate) fn of_this_rank(&self) -> Self {
         Self { agreed: Arc::clone(&self.asked), ..self.clone() }
     }

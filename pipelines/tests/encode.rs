@@ -337,7 +337,7 @@ fn viewer_frames() -> Value {
         let frame = decoder.decode(message).unwrap();
         let fields = frame.fields.iter().map(|field| {
             json!({"name": field.name, "association": field.association, "components": field.components,
-                   "values": field.values.iter().map(|&value| value as f32).collect::<Vec<_>>()})
+                   "values": field.values})
         });
         let cells = frame.cells.map(|cells| {
             json!({"triangles": cells.triangles.as_flattened(), "lines": cells.lines.as_flattened(),

@@ -86,7 +86,7 @@ impl Adaptor {
         }
     }
 
-    /// Says to whom it may concern what no order's outcome can say. Once: rank 0 speaks for all.
+    /// Says to whom it may concern what no order's outcome can say. Once: only rank 0 tells it.
     pub(super) fn complain(&self, message: &str) {
         if self.communicator.rank() > 0 {
             return;
@@ -252,6 +252,11 @@ impl Adaptor {
             }
             Command::Stop {} => {
                 self.stopped = true;
+                // Whoever asked, no shape is found any more; but a replay has the orders of the cycle
+                // in which the run was stopped.
+                if !self.is_replay {
+                    self.forecaster.get().into_iter().for_each(Forecaster::give_up);
+                }
                 Ok(())
             }
             Command::Cancel(cancel) => self.cancel(&cancel.order, source, moment),
@@ -418,7 +423,9 @@ impl CommandSink for Intake {
         text: &str,
     ) -> Result<(), String> {
         let command = match message {
-            Message::Command(Command::Order(_) | Command::Parameter(_)) if self.is_replay => {
+            Message::Command(Command::Order(_) | Command::Parameter(_) | Command::Cancel(_))
+                if self.is_replay =>
+            {
                 return Err("this run replays a journal: it can be watched, paused and stopped, \
                             and its shape is that of the journal"
                     .into());

@@ -73,6 +73,9 @@ impl Adaptor {
         if self.communicator.rank() == 0 {
             self.complain(reason);
         }
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.release(self.moment, reason);
+        }
         self.mesh = SteeredMesh::Refused(reason.to_owned());
         self.tell_stack();
         self.tell_conditions();

@@ -172,15 +172,12 @@ impl Links {
         let certificate = self.fingerprint.as_ref().map_or_else(String::new, |fingerprint| {
             format!("\nits certificate has the SHA-256 fingerprint {}", with_colons(fingerprint))
         });
-        let (opens, leads) = match self.is_of_recording {
-            true => ("links for others are in", "the links to this recording are in"),
-            false => {
-                ("links for others, and to watch only, are in", "the links to this run are in")
-            }
-        };
+        let [to_run, to_recording, of_run, of_recording] = ARE_IN;
+        let (opens, leads) =
+            if self.is_of_recording { (of_recording, to_recording) } else { (of_run, to_run) };
         let invitation = match self.browser_link().filter(|_| terminal) {
-            Some(link) => format!("open {link}\nIt opens one browser, once; {opens} {path}"),
-            None => format!("{leads} {path}"),
+            Some(link) => format!("open {link}\nIt opens one browser, once; {opens}{path}"),
+            None => format!("{leads}{path}"),
         };
         let waits = match &self.relay {
             Some(relay) if !relay.is_connected() => {
@@ -197,7 +194,11 @@ impl Links {
         let lines = self.lines();
         match &*file {
             Some(there) if there.0 == path => there.rewrite(&lines)?,
-            _ => *file = Some(LinkFile::write(path, &lines)?),
+            _ => {
+                // First the old one goes, which may be the same file by another name.
+                *file = None;
+                *file = Some(LinkFile::write(path, &lines)?);
+            }
         }
         Ok(())
     }

@@ -95,9 +95,11 @@ impl Hub {
     }
 
     /// Takes note that a viewer ends its connection by itself: the wheel is not kept for it.
-    pub(super) fn let_go(&self, client: u64) {
+    pub(super) fn let_go(&self, client: &Arc<Client>) {
         let mut state = lock(&self.state);
-        if state.wheel.driver == Some(client) {
+        // It may have come back by another connection.
+        let is_seated = state.clients.get(&client.id).is_some_and(|it| Arc::ptr_eq(it, client));
+        if is_seated && state.wheel.driver == Some(client.id) {
             (state.wheel.driver, state.wheel.lost) = (None, None);
             state.status_dirty = true;
             state.together.changed();
@@ -179,5 +181,33 @@ impl Hub {
         }
         other.close((4001, "the one that drives has ended this connection"));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::hub::Arrival;
+
+    fn joined(hub: &Hub, returning: Option<(&str, &str)>) -> Arc<Client> {
+        match hub.join(9, Access::Drive, true, returning) {
+            Ok(Arrival::Client(client)) => client,
+            _ => panic!("there is room"),
+        }
+    }
+
+    #[test]
+    fn the_end_of_an_old_connection_takes_nothing_from_the_new_one() {
+        let hub = Hub::default();
+        let old = joined(&hub, None);
+        assert!(hub.is_driver(old.id));
+        let new = joined(&hub, Some((&name(old.id), old.back.as_str())));
+        assert_eq!(old.id, new.id);
+        // What it said last comes late.
+        hub.let_go(&old);
+        hub.leave(&old);
+        assert!(hub.is_driver(new.id));
+        hub.let_go(&new);
+        assert!(!hub.is_driver(new.id));
     }
 }

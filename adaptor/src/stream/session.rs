@@ -170,7 +170,7 @@ async fn read(
                 // A program that is done says nothing or 1000. A page that is left or loaded again
                 // says 1001, and may come back.
                 if close.is_none_or(|close| close.code == 1000) {
-                    seat.hub.let_go(client.id);
+                    seat.hub.let_go(client);
                 }
                 return;
             }

@@ -135,9 +135,9 @@ pub trait Solvers: std::fmt::Debug + Send + Sync {
         true
     }
 
-    /// The same choice of solvers that are given up where that is asked for; `None` where solves
-    /// are finished first.
-    fn unless(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
+    /// These solvers with what has a set-up and a solve given up; `None` where these are finished
+    /// first.
+    fn with_cancellation(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
         let _ = cancellation;
         None
     }
@@ -159,7 +159,7 @@ impl Solvers for BuiltIn {
         solver(matrix, halo)
     }
 
-    fn unless(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
+    fn with_cancellation(&self, cancellation: &Cancellation) -> Option<Arc<dyn Solvers>> {
         Some(Arc::new(Cancellable(cancellation.clone())))
     }
 }

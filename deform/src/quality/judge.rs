@@ -18,9 +18,9 @@ use crate::mesh::{Domain, Mesh, Vector};
 use crate::number::real;
 use crate::parallel;
 
-/// Shapes of cells that are looked at between two places where it can be given up: on several ranks
-/// these must meet to know.
-const TOGETHER: usize = 1 << 26;
+/// Shapes of cells that are looked at between two places where it can be given up: a tenth of a second
+/// of work. On several ranks these must meet there to know.
+const TOGETHER: usize = 1 << 22;
 
 /// The quality along a path that the guard lets through.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]

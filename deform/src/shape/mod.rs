@@ -235,7 +235,7 @@ impl Shaper {
     #[must_use]
     pub fn with_solvers(self, solvers: Arc<dyn Solvers>) -> Self {
         let Body { domain, boundary, cancellation, .. } = &*self.body;
-        let solvers = solvers.unless(cancellation).unwrap_or(solvers);
+        let solvers = solvers.with_cancellation(cancellation).unwrap_or(solvers);
         let body = Body {
             domain: domain.clone(),
             boundary: boundary.clone(),

@@ -257,7 +257,7 @@ pub struct Steering {
     /// mesh moves they come together at every call.
     pub poll_steps: NonZeroU32,
     /// Seconds that an order of a viewer may wait for its turn, from when it came in: behind others,
-    /// or for the solver. It is rejected then, so that nothing moves the mesh that nobody thinks of
+    /// for the solver, or for a paused run to go on. It is rejected then, so that nothing moves the mesh that nobody thinks of
     /// any more. An order that a restarted run takes over waits without end.
     pub deadline: NonZeroU32,
     /// Seconds after which a paused run goes on by itself while nobody is connected who could resume

@@ -54,7 +54,7 @@ export function streamAddress(page: string): { [name in "address" | "probe" | "s
 export interface Identity { client: string; back: string }
 
 /** The codes with which the server closes a connection for good, or because the viewer has another. */
-const ENDED = 1000, KICKED = 4001, REPLACED = 4002;
+const ENDED = 1000, RETURNING = 4000, KICKED = 4001, REPLACED = 4002;
 
 export const browserSurroundings: Surroundings = {
   open: (address) => new WebSocket(address),
@@ -132,16 +132,16 @@ export class Connection {
   /** Gives the connection up and opens another. */
   renew(reason: string): void {
     if (!this.socket) return;
-    this.letGo();
+    this.letGo(RETURNING);
     this.again("reconnecting", reason, backOff(this.attempt++, this.surroundings.random()));
   }
 
-  /** Closes the socket; what still comes of it is not heard. */
-  private letGo(): void {
+  /** Closes the socket; what still comes of it is not heard. Without a code the run keeps the wheel for nobody. */
+  private letGo(code?: number): void {
     const { socket } = this;
     this.socket = null;
     this.stopListening();
-    socket?.close();
+    socket?.close(code);
   }
 
   /** Begins to wait for the next sign of life. */
@@ -162,7 +162,7 @@ export class Connection {
 
   private open(): void {
     // One that was being opened is not waited for any more.
-    this.letGo();
+    this.letGo(RETURNING);
     let socket: WebSocket;
     try {
       const identity = this.identity === null ? "" : `?${new URLSearchParams({ ...this.identity }).toString()}`;

@@ -17,7 +17,7 @@ const kernel = new Promise<Kernel>((resolve) => { loaded = resolve; });
 async function decode(message: ArrayBuffer): Promise<void> {
   try {
     const frames = (await kernel).decodeFrame(new Uint8Array(message));
-    const arrays = frames.flatMap((frame): (Uint32Array | Float32Array | null)[] => frame.kind === "topology"
+    const arrays = frames.flatMap((frame): (Uint32Array | Float32Array | Float64Array | null)[] => frame.kind === "topology"
       ? [frame.triangles, frame.lines, frame.triangleFeatures] : [frame.points, ...frame.fields.map((field) => field.values)]);
     const buffers = arrays.flatMap((array) => (array ? [array.buffer as ArrayBuffer] : []));
     worker.postMessage({ frames }, buffers);

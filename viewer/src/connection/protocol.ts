@@ -219,7 +219,7 @@ export interface DataArray {
   name: string;
   association: Association;
   components: number;
-  values: Float32Array;
+  values: Float64Array;
 }
 
 /** The values of one view at one cycle; `points` are the coordinates. */

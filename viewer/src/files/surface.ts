@@ -44,7 +44,7 @@ export function vtp({ triangles, lines }: Pick<TopologyFrame, "triangles" | "lin
   const array = ({ name, components, values, association }: DataFrame["fields"][number]): string => {
     // VTK counts the lines before the polygons, a frame the other way round.
     const ordered = association === "vertex" ? values : [...values.subarray(count * components), ...values.subarray(0, count * components)];
-    return `<DataArray type="Float32" Name="${escaped(name)}" NumberOfComponents="${components}" format="ascii">${list(ordered)}</DataArray>\n`;
+    return `<DataArray type="Float64" Name="${escaped(name)}" NumberOfComponents="${components}" format="ascii">${list(ordered)}</DataArray>\n`;
   };
   const of = (association: "vertex" | "element"): string => fields.filter((field) => field.association === association).map(array).join("");
   return `<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian">\n<PolyData>\n`

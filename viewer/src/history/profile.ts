@@ -40,7 +40,7 @@ export function together(profiles: readonly (Profile | null)[]): { distances: nu
 }
 
 /** How much of a view has a value: by area, or by number where there are no faces. */
-export interface Weighted { values: Float32Array; weights: Float32Array; least: number; largest: number; mean: number }
+export interface Weighted { values: Float64Array; weights: Float64Array; least: number; largest: number; mean: number }
 
 /** The values of a field on the faces of a view, each with its area; null where the frame does not carry it. */
 export function weighted(topology: Pick<TopologyFrame, "triangles">, { points, fields }: Pick<DataFrame, "points" | "fields">, name: string, component: number): Weighted | null {
@@ -49,7 +49,7 @@ export function weighted(topology: Pick<TopologyFrame, "triangles">, { points, f
   const all = scalars(field, component);
   const { triangles } = topology;
   const count = triangles.length / 3;
-  const values = new Float32Array(count), weights = new Float32Array(count);
+  const values = new Float64Array(count), weights = new Float64Array(count);
   let least = Infinity, largest = -Infinity, sum = 0, total = 0;
   for (let t = 0; t < count; t++) {
     const [a, b, c] = [triangles[3 * t]!, triangles[3 * t + 1]!, triangles[3 * t + 2]!];

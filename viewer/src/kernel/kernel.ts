@@ -82,7 +82,7 @@ export class Kernel extends Module<Exports> {
       const { view, topology, cycle, time, points, fields, cells, features } = JSON.parse(this.text(0)) as FrameHeader;
       const data: DataFrame = {
         kind: "data", view, topology, cycle, time, points: new Float32Array(this.bytes(1)),
-        fields: fields.map((field, index) => ({ ...field, values: new Float32Array(this.bytes(2 + index)) })),
+        fields: fields.map((field, index) => ({ ...field, values: new Float64Array(this.bytes(2 + index)) })),
       };
       if (!cells) return [data];
       const numbers = (index: number): Uint32Array => new Uint32Array(this.bytes(2 + fields.length + index));

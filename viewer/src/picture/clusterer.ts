@@ -55,7 +55,12 @@ export class Clusterer {
       return this.next();
     }
     this.underway = wish;
-    this.started().postMessage({ points: wish.points, triangles: wish.topology.triangles, features: wish.topology.triangleFeatures });
+    try {
+      this.started().postMessage({ points: wish.points, triangles: wish.topology.triangles, features: wish.topology.triangleFeatures });
+    } catch (error) {
+      console.error(error);
+      this.take(null);
+    }
   }
 
   private started(): ClusterWorker {

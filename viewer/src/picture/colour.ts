@@ -19,11 +19,11 @@ export const gradient = (map: ColourMap, direction: string): string =>
   `linear-gradient(${direction}, ${map.stops.map((stop) => `rgb(${stop.map((x) => Math.round(x * 255)).join(" ")})`).join(", ")})`;
 
 /** The scalars of a field, one per point or element: the magnitude of a vector, or one of its components. */
-export function scalars(field: DataArray, component: number): Float32Array {
+export function scalars(field: DataArray, component: number): Float64Array {
   const { components, values } = field;
   if (components === 1) return values;
   const count = values.length / components;
-  const result = new Float32Array(count);
+  const result = new Float64Array(count);
   for (let i = 0; i < count; i++) {
     if (component >= 0) {
       result[i] = values[i * components + Math.min(component, components - 1)]!;
@@ -40,7 +40,7 @@ export function scalars(field: DataArray, component: number): Float32Array {
  * Where values lie between the ends of a range: 0 at the low end, 1 at the high one, NaN where there is no number. With logarithms nothing
  * lies below the low end: between a zero and its neighbour a colour would otherwise hardly be seen.
  */
-export function mapped(values: Float32Array, [low, high]: readonly [number, number], logarithmic: boolean, into: Float32Array = new Float32Array(values.length)): Float32Array {
+export function mapped(values: Float64Array, [low, high]: readonly [number, number], logarithmic: boolean, into: Float32Array = new Float32Array(values.length)): Float32Array {
   const origin = logarithmic ? Math.log10(low) : low;
   const part = 1 / ((logarithmic ? Math.log10(high) : high) - origin);
   if (!logarithmic) for (let i = 0; i < values.length; i++) into[i] = (values[i]! - origin) * part;
@@ -50,18 +50,18 @@ export function mapped(values: Float32Array, [low, high]: readonly [number, numb
 
 /** The grey, between 0 and 1, of what is no number, as in the pictures that a run writes. */
 export const NO_NUMBER = 0.5;
-/** The same for the page, and what stands beside it. */
+/** The grey of what is no number, for the page; and its name. */
 export const GREY = `rgb(${Array(3).fill(Math.round(255 * NO_NUMBER)).join(" ")})`;
 export const NO_NUMBER_TEXT = "no number";
 
 /** Whether some value is no number. */
-export function hasGaps(values: Float32Array): boolean {
+export function hasGaps(values: Float64Array): boolean {
   for (const value of values) if (Number.isNaN(value)) return true;
   return false;
 }
 
 /** Smallest and largest finite value; null when there is none. */
-export function extremes(values: Float32Array): [number, number] | null {
+export function extremes(values: Float64Array): [number, number] | null {
   let low = Infinity;
   let high = -Infinity;
   for (const value of values) {

@@ -15,14 +15,14 @@ const FARTHEST = 1000;
 interface Mapped { getColorCoordinates(): vtkDataArray | null; getNumberOfColorsInRange(): number }
 
 /** The values that colour: of which field they are, and what vtk.js counts first among its cells. */
-interface Taken { field: DataArray; component: number; values: Float32Array; range: Range | null; hasGaps: boolean }
+interface Taken { field: DataArray; component: number; values: Float64Array; range: Range | null; hasGaps: boolean }
 
 export class Colouring {
   /** The colours from 0 to 1. The values are brought between these two: vtk.js makes a map anew whenever its ends change, and its shaders with it. */
   readonly table = vtkColorTransferFunction.newInstance();
   private map = "";
   private taken: Taken | null = null;
-  private painted: { values: Float32Array; low: number; high: number; logarithmic: boolean } | null = null;
+  private painted: { values: Float64Array; low: number; high: number; logarithmic: boolean } | null = null;
   private drawn: vtkDataArray | null = null;
 
   constructor(private readonly data: vtkPolyData, private readonly mapper: vtkMapper) {
@@ -107,8 +107,8 @@ export class Colouring {
   }
 }
 
-function linesFirst(values: Float32Array, triangles: number): Float32Array {
-  const result = new Float32Array(values.length);
+function linesFirst(values: Float64Array, triangles: number): Float64Array {
+  const result = new Float64Array(values.length);
   result.set(values.subarray(triangles));
   result.set(values.subarray(0, triangles), values.length - triangles);
   return result;

@@ -115,7 +115,7 @@ export class Layer {
   private readonly edges: Piece;
   private readonly highlights: Partial<Record<Highlight, HighlightPieces>> = {};
   private readonly highlighted: Record<Highlight, string> = { hover: "", handle: "", fixed: "" };
-  /** Who stands for whom where the view is drawn with fewer triangles; null where it has none to spare, or they are not known yet. */
+  /** For each point the one in whose place it is drawn, where the view is drawn with fewer triangles; null where it has none to spare, or they are not known yet. */
   private representatives: Uint32Array | null = null;
   private unwant: () => void = () => undefined;
 
@@ -229,7 +229,7 @@ export class Layer {
       ? featureEdges(topology.triangles, topology.triangleFeatures, topology.points) : new Uint32Array(0));
   }
 
-  /** Takes who stands for whom; null where nobody does, and the view is drawn whole. What lies on the surface goes with it. */
+  /** Takes the representatives; null where the view is drawn whole. What lies on the surface goes with it. */
   private takeClusters(clusters: Clusters | null): void {
     this.representatives = clusters?.representatives ?? null;
     this.surface.setCoarse(clusters && { triangles: clusters.triangles });

@@ -10,7 +10,8 @@ class FakeSocket {
   onmessage: ((event: { data: string | ArrayBuffer }) => void) | null = null;
   onclose: ((event: { code: number; reason: string }) => void) | null = null;
   send(text: string): void { this.sent.push(text); }
-  close(): void { this.end(1000); }
+  closedWith: number | undefined | null = null;
+  close(code?: number): void { this.closedWith = code; this.end(code ?? 1000); }
   open(): void { this.readyState = 1; this.onopen?.(); }
   end(code: number, reason = ""): void { this.readyState = 3; this.onclose?.({ code, reason }); }
 }
@@ -110,6 +111,8 @@ describe("a connection", () => {
     silence()!();
     expect(states.at(-1)).toEqual(["reconnecting", "Nothing was heard for 25 seconds."]);
     expect([sockets[0]!.readyState, silence()]).toEqual([3, null]);
+    // It comes back: the run keeps the wheel for it.
+    expect(sockets[0]!.closedWith).toBe(4000);
     timers[0]!.action();
     expect([addresses.length, timers.length]).toEqual([2, 1]);
     // What was on its way on the old one is not heard.
@@ -126,6 +129,7 @@ describe("a connection", () => {
     sockets[0]!.open();
     connection.stop();
     await settle();
+    expect(sockets[0]!.closedWith).toBeUndefined();
     expect(silence()).toBeNull();
   });
 

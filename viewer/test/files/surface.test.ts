@@ -21,7 +21,7 @@ describe("a surface in a file", () => {
 
   it("as VTP counts lines before polygons, and names what a name must not hold", () => {
     const text = vtp({ triangles, lines: Uint32Array.from([0, 1]) }, {
-      points, time: 0.5, fields: [{ name: "a<b", association: "element", components: 1, values: Float32Array.from([1, 2, 3]) }, { name: "p", association: "vertex", components: 1, values: Float32Array.from([1, 2, 3, NaN]) }],
+      points, time: 0.5, fields: [{ name: "a<b", association: "element", components: 1, values: Float64Array.from([1, 2, 3]) }, { name: "p", association: "vertex", components: 1, values: Float64Array.from([1, 2, 3, NaN]) }],
     });
     const document = text.replaceAll("\n", "");
     expect(document).toContain('NumberOfPoints="4" NumberOfLines="1" NumberOfPolys="2"');

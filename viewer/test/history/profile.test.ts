@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { histogram, profile, together, weighted } from "../../src/history/profile";
 
-const field = (name: string, values: number[], association: "vertex" | "element" = "vertex", components = 1) => ({ name, association, components, values: Float32Array.from(values) });
+const field = (name: string, values: number[], association: "vertex" | "element" = "vertex", components = 1) => ({ name, association, components, values: Float64Array.from(values) });
 
 describe("a profile along a line", () => {
   it("has the values in the order of their distance, and a gap where the line leaves the domain", () => {

@@ -5,7 +5,7 @@ import { fieldNamed, fieldsOf, sameFields } from "../../src/store/fields";
 import { page } from "../page";
 
 const VELOCITY = { name: "velocity", association: "vertex" as const, components: 3, unit: "m/s" };
-const array = (name: string, components: number) => ({ name, association: "vertex" as const, components, values: new Float32Array(0) });
+const array = (name: string, components: number) => ({ name, association: "vertex" as const, components, values: new Float64Array(0) });
 
 describe("the look of a view", () => {
   let made: ReturnType<typeof page>;

@@ -37,6 +37,15 @@ test("a small view is never clustered, and a large one once it has been there fo
   expect(answered).toHaveBeenCalledExactlyOnceWith(clusters);
 });
 
+test("views are drawn whole where no worker can be started, and the next is asked for all the same", () => {
+  vi.spyOn(console, "error").mockImplementation(() => undefined);
+  const answered: ClusterAnswer[] = [];
+  clusterer = new Clusterer(() => { throw new Error("no more workers"); });
+  for (const wanted of [topology(), topology()]) clusterer.want(wanted, points, (found) => answered.push(found));
+  vi.advanceTimersByTime(PATIENCE);
+  expect(answered).toEqual([null, null]);
+});
+
 test("a topology that has gone is not clustered, and its clusters go to nobody", () => {
   const answered = vi.fn();
   const gone = clusterer.want(topology(), points, answered);

@@ -17,7 +17,7 @@ const topology: TopologyFrame = {
 };
 const frame = (cycle: number, values: number[], points = POINTS): DataFrame => ({
   kind: "data", view: "cut", topology: "1", cycle, time: cycle, points: Float32Array.from(points),
-  fields: [{ name: "p", association: values.length === 2 ? "element" : "vertex", components: 1, values: Float32Array.from(values) }],
+  fields: [{ name: "p", association: values.length === 2 ? "element" : "vertex", components: 1, values: Float64Array.from(values) }],
 });
 const view = { name: "cut", kind: "slice" };
 
@@ -117,7 +117,7 @@ describe("colours", () => {
       other.setInterpolateScalarsBeforeMapping(true);
       const scalars = parts.surface.data.getPointData().getScalars();
       const fresh = other as unknown as Mapping;
-      parts.surface.data.getPointData().setScalars(vtkDataArray.newInstance({ numberOfComponents: 1, values: Float32Array.from(scalars.getData()) }));
+      parts.surface.data.getPointData().setScalars(vtkDataArray.newInstance({ numberOfComponents: 1, values: Float64Array.from(scalars.getData()) }));
       fresh.mapScalars(parts.surface.data, 1);
       parts.surface.data.getPointData().setScalars(scalars);
       const expected = fresh.getColorCoordinates()!.getData();
@@ -174,7 +174,7 @@ describe("colours", () => {
   });
 
   it("show no number as such with logarithms, and what is too small as the smallest", () => {
-    expect([...mapped(Float32Array.from([NaN, 0, -3, 1, 10]), [1e-6, 1], true)].map((part) => Math.round(1e4 * part) / 1e4)).toEqual([NaN, 0, 0, 1, 1.1667]);
-    expect([...mapped(Float32Array.from([NaN, 2, 3, 1]), [2, 4], false)]).toEqual([NaN, 0, 0.5, -0.5]);
+    expect([...mapped(Float64Array.from([NaN, 0, -3, 1, 10]), [1e-6, 1], true)].map((part) => Math.round(1e4 * part) / 1e4)).toEqual([NaN, 0, 0, 1, 1.1667]);
+    expect([...mapped(Float64Array.from([NaN, 2, 3, 1]), [2, 4], false)]).toEqual([NaN, 0, 0.5, -0.5]);
   });
 });

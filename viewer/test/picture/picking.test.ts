@@ -33,12 +33,12 @@ describe("picking", () => {
 });
 
 describe("scalars", () => {
-  const field = { name: "v", association: "vertex" as const, components: 3, values: Float32Array.from([3, 4, 0, 0, 0, -2]), range: null };
+  const field = { name: "v", association: "vertex" as const, components: 3, values: Float64Array.from([3, 4, 0, 0, 0, -2]), range: null };
   it("are the magnitude or a component", () => {
     expect([...scalars(field, -1)]).toEqual([5, 2]);
     expect([...scalars(field, 1)]).toEqual([4, 0]);
-    expect(extremes(Float32Array.from([NaN, 2, -1, Infinity]))).toEqual([-1, 2]);
-    expect(extremes(new Float32Array(0))).toBeNull();
+    expect(extremes(Float64Array.from([NaN, 2, -1, Infinity]))).toEqual([-1, 2]);
+    expect(extremes(new Float64Array(0))).toBeNull();
   });
 });
 

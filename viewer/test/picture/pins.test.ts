@@ -19,7 +19,7 @@ describe("a pinned place", () => {
     topology: { kind: "topology", view: "v", topology, points: 4, triangles: Uint32Array.from(isTurned ? [1, 3, 2, 0, 1, 2] : [0, 1, 2, 1, 3, 2]), triangleFeatures: null, lines: new Uint32Array(0) },
     frame: {
       kind: "data", view: "v", topology, cycle, time: cycle, points: Float32Array.from([0, 0, z, 2, 0, z, 0, 2, z, 2, 2, z]),
-      fields: [{ name: "x", association: "vertex", components: 1, values: Float32Array.from([0, 2, 0, 2]) }],
+      fields: [{ name: "x", association: "vertex", components: 1, values: Float64Array.from([0, 2, 0, 2]) }],
     },
   });
   const show = (next: typeof shown): void => {

@@ -8,9 +8,9 @@ const topology: TopologyFrame = {
 const frame: DataFrame = {
   kind: "data", view: "v", topology: "1", cycle: 7, time: 0.7, points: Float32Array.from([0, 0, 0, 2, 0, 0, 0, 2, 0, 2, 2, 0]),
   fields: [
-    { name: "x", association: "vertex", components: 1, values: Float32Array.from([0, 2, 0, 2]) },
-    { name: "v", association: "vertex", components: 3, values: Float32Array.from([3, 4, 0, 3, 4, 0, 3, 4, 0, 3, 4, 0]) },
-    { name: "q", association: "element", components: 1, values: Float32Array.from([0.25, NaN]) },
+    { name: "x", association: "vertex", components: 1, values: Float64Array.from([0, 2, 0, 2]) },
+    { name: "v", association: "vertex", components: 3, values: Float64Array.from([3, 4, 0, 3, 4, 0, 3, 4, 0, 3, 4, 0]) },
+    { name: "q", association: "element", components: 1, values: Float64Array.from([0.25, NaN]) },
   ],
 };
 const read = (field: string | null, triangle = 0, component = -1) => readProbe({ view: "v", topology: "1", triangle, weights: [0.25, 0.25, 0.5] }, topology, frame, { field, component });

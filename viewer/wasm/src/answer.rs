@@ -15,6 +15,8 @@ pub enum Array {
     Triangles(Vec<[u32; 3]>),
     /// Values in single precision.
     Singles(Vec<f32>),
+    /// Values in double precision.
+    Doubles(Vec<f64>),
 }
 
 impl Array {
@@ -27,6 +29,7 @@ impl Array {
             Array::Numbers(values) => values.as_ptr().cast(),
             Array::Triangles(values) => values.as_ptr().cast(),
             Array::Singles(values) => values.as_ptr().cast(),
+            Array::Doubles(values) => values.as_ptr().cast(),
         }
     }
 
@@ -39,6 +42,7 @@ impl Array {
             Array::Numbers(values) => size_of_val(&values[..]),
             Array::Triangles(values) => size_of_val(&values[..]),
             Array::Singles(values) => size_of_val(&values[..]),
+            Array::Doubles(values) => size_of_val(&values[..]),
         }
     }
 }

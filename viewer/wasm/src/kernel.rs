@@ -259,7 +259,8 @@ fn arrays(frame: DecodedFrame) -> Vec<Array> {
         "cells": cells.is_some(), "features": cells.is_some_and(|cells| cells.triangle_features.is_some()),
     });
     let mut arrays = vec![Array::Text(header.to_string()), singles(frame.points.as_flattened())];
-    arrays.extend(frame.fields.iter().map(|field| singles(&field.values)));
+    // A pressure of many bars has waves of some pascals: single precision would draw and read steps.
+    arrays.extend(frame.fields.into_iter().map(|field| Array::Doubles(field.values)));
     if let Some(cells) = frame.cells {
         arrays.push(Array::Triangles(cells.triangles));
         arrays.push(Array::Numbers(cells.lines.into_flattened()));

@@ -18,7 +18,7 @@
 //! | [`displacement`] | a stack of edits (JSON) | 1 | the displacement of each vertex `f64` |
 //! | [`check`] | | 1 | what is wrong with the shape of the last displacement (a line, empty where it is sound), the first triangles at fault `u32` |
 //! | [`skeleton`] | | 1 | nodes `f64`, the number of nodes of each curve `u32`, their nodes `u32`, the node of each vertex `u32` |
-//! | [`decode_frame`] | the next frame of a view | 1 | its header (JSON), points `f32`, each field `f32`; where it brought cells: triangles `u32`, lines `u32`, the feature of each triangle `u32` |
+//! | [`decode_frame`] | the next frame of a view | 1 | its header (JSON), points `f32`, each field `f64`; where it brought cells: triangles `u32`, lines `u32`, the feature of each triangle `u32` |
 //! | [`rehearse`] | | | |
 //! | [`check_pipeline`] | a pipeline and the run it is for (JSON) | 1 | its errors (JSON) |
 //!

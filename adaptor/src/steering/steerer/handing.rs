@@ -92,6 +92,20 @@ impl Steerer {
         }
     }
 
+    /// Ends the steering of a mesh that the solver has replaced: no order has its turn any more, and
+    /// the one under way goes no further.
+    pub(crate) fn release(&mut self, moment: Moment, reason: &str) {
+        let computing = self.computing.take().map(|computing| computing.id);
+        let waiting = std::mem::take(&mut self.waiting).into_iter().map(|task| task.id);
+        for id in computing.into_iter().chain(waiting) {
+            self.log.reject(&id, moment, &reason.into());
+        }
+        if let Some(Pending { id, shape, moment, .. }) = self.pending.take() {
+            self.log.not_confirmed(&id, moment, shape);
+        }
+        self.give_up(reason);
+    }
+
     /// The motion that was handed out last.
     pub(crate) fn motion(&self) -> &MeshMotion {
         &self.handed_out

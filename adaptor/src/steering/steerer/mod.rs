@@ -478,7 +478,9 @@ impl Steerer {
                     (None, None) => lock(&self.planner).plan(&computing.asked),
                     (None, Some(together)) => {
                         // What a run has done before, nobody takes back.
-                        let id = self.recorded.is_none().then_some(&*computing.id);
+                        let recorded = self.recorded.as_ref();
+                        let is_repeated = recorded.is_some_and(|it| it.repeats(moment.cycle));
+                        let id = (!is_repeated).then_some(&*computing.id);
                         let plan = || lock(&self.planner).plan(&computing.asked);
                         let plan = together.run(id, plan);
                         if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {

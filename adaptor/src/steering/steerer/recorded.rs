@@ -40,6 +40,11 @@ impl Recorded {
         self.until.is_none_or(|until| cycle < until) || self.position(order, cycle).is_some()
     }
 
+    /// Whether what happens at this cycle has happened before.
+    pub(super) fn repeats(&self, cycle: u64) -> bool {
+        self.until.is_none_or(|until| cycle <= until)
+    }
+
     /// Whether a whole run is carried out again.
     pub(super) fn is_whole(&self) -> bool {
         self.until.is_none()
@@ -48,5 +53,18 @@ impl Recorded {
     /// The position that was handed out at this cycle.
     pub(super) fn position(&self, order: &str, cycle: u64) -> Option<f64> {
         self.positions.get(order)?.get(&cycle).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_behind_the_end_of_a_journal_has_not_happened_before() {
+        let recorded = Recorded::new(Vec::new());
+        assert!(recorded.repeats(u64::MAX), "a whole run is carried out again");
+        let recorded = recorded.until(7);
+        assert_eq!([6, 7, 8].map(|cycle| recorded.repeats(cycle)), [true, true, false]);
     }
 }

@@ -25,7 +25,7 @@ _WHEEL = 8.0
 #: How long it is asked for at once.
 _SLICE = 0.2
 #: How long one who has left may still be told as the driver.
-_LEAVING = 1.0
+_LEAVING = 3.0
 #: How links begin.
 _SCHEMES = ("http://", "https://", "unix:")
 
