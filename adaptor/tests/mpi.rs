@@ -202,18 +202,18 @@ fn stopped_while_planning(ranks: Arc<dyn Communicator>) {
         (steering.motion.is_some(), steering.stop)
     };
     assert_eq!(execute(&mut adaptor, 0), (false, false));
-    let (stopper, begun) = (adaptor.stopper(), Instant::now());
+    let stopper = adaptor.stopper();
     let stopping = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(3));
         if rank == 0 {
             stopper.stop();
         }
+        Instant::now()
     });
     assert!(!execute(&mut adaptor, 1).0, "its shapes were found before the stop");
-    let took = begun.elapsed();
-    assert!(took >= Duration::from_secs(2), "they were found in {took:?}");
+    let ended = Instant::now();
+    let took = ended.saturating_duration_since(stopping.join().unwrap());
     assert!(took < BOUND, "rank {rank} of {size} went on for {took:?}");
-    stopping.join().unwrap();
     assert_eq!(execute(&mut adaptor, 2), (false, true));
     let report = adaptor.finalize().unwrap();
     if rank == 0 {

@@ -167,7 +167,7 @@ fn orders_given_in_a_pause_begin_nothing_on_any_rank() {
         let rank = ranks.rank();
         let part = part(&mesh, rank);
         let mut config = config(LINK_TO_ALL);
-        config.steering.deadline = std::num::NonZeroU32::new(2).expect("not 0");
+        config.steering.deadline = std::num::NonZeroU32::new(10).expect("not 0");
         let communicator = Arc::new(ranks);
         let mut adaptor =
             Adaptor::initialize(Settings { config, communicator, ..Settings::default() })
