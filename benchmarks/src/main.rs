@@ -16,6 +16,7 @@
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
 //! cargo run --release -p tombolo-benchmarks -- python --json
 //! cargo run --release -p tombolo-benchmarks -- stream --json
+//! cargo run --release -p tombolo-benchmarks -- paraview --json
 //! cargo run --release -p tombolo-benchmarks -- service --json
 //! cargo run --release -p tombolo-benchmarks -- volume --json
 //! cargo run --release -p tombolo-benchmarks --features distributed -- volume-ranks --json
@@ -29,6 +30,7 @@ mod growth;
 mod measure;
 mod overhead;
 mod paper;
+mod paraview;
 mod peer;
 mod python;
 mod report;
@@ -120,6 +122,8 @@ enum Name {
     Python,
     /// Streaming a surface from a solver in Python to another process, beside Rerun.
     Stream,
+    /// The cost of a step of a run that is followed in ParaView.
+    Paraview,
     /// Many viewers, slow ones and deaf ones; many and large orders; how soon the mesh moves.
     Service,
     /// The time and the memory of an order, from ten thousand cells to five million.
@@ -155,6 +159,7 @@ fn main() -> ExitCode {
         Name::VolumeRanks => text(volume_ranks::run(), json),
         Name::Python => text(python::run(), json),
         Name::Stream => text(stream::run(), json),
+        Name::Paraview => text(paraview::run(), json),
         Name::Service => text(service::run(arguments.short), json),
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),

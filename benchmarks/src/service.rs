@@ -70,7 +70,7 @@ impl Line for Row {
 }
 
 /// A run of the flow solver with its adaptor.
-struct Run {
+pub struct Run {
     adaptor: Adaptor,
     solver: Solver,
     mesh: Mesh,
@@ -82,9 +82,9 @@ struct Run {
 }
 
 /// What the steps of a part took.
-struct Steps {
+pub struct Steps {
     /// The whole step, and the part of it inside `execute`.
-    whole: Times,
+    pub whole: Times,
     execute: Times,
     /// The most memory that was seen, in MiB.
     memory: f64,
@@ -92,7 +92,10 @@ struct Steps {
 
 impl Run {
     /// A run on the channel of so many boxes along each side.
-    fn new(counts: [usize; 3]) -> Result<Self, Box<dyn Error>> {
+    ///
+    /// # Errors
+    /// Where the mesh, the adaptor or the solver cannot be made.
+    pub fn new(counts: [usize; 3]) -> Result<Self, Box<dyn Error>> {
         let mesh = channel(counts)?;
         let view = |name: &str, stage: serde_json::Value| {
             json!({"name": name, "every": {"steps": EVERY}, "stages": [
@@ -110,7 +113,10 @@ impl Run {
     }
 
     /// Steps until something holds, for so long at least and at most.
-    fn steps(
+    ///
+    /// # Errors
+    /// The first error of a step, or where it does not hold in time.
+    pub fn steps(
         &mut self,
         mut is_over: impl FnMut() -> bool,
         [least, most]: [Duration; 2],
@@ -156,9 +162,26 @@ impl Run {
         Ok(steps)
     }
 
+    /// The link of those who may drive.
+    ///
+    /// # Errors
+    /// Where the run has no server.
+    pub fn link(&self) -> Result<String, Box<dyn Error>> {
+        Ok(self.adaptor.link().ok_or("a run has a link")?)
+    }
+
+    /// Ends the run.
+    ///
+    /// # Errors
+    /// Where a file could not be written.
+    pub fn finish(self) -> Result<(), Box<dyn Error>> {
+        self.adaptor.finalize()?;
+        Ok(())
+    }
+
     /// Steps beside viewers in a process of their own, until that has ended.
     fn beside(&mut self, task: &Task, most: Duration) -> Result<(Steps, Seen), Box<dyn Error>> {
-        let link = self.adaptor.link().ok_or("a run has a link")?;
+        let link = self.link()?;
         let mut viewers = Viewers::start(&link, task)?;
         let steps = self.steps(|| viewers.has_ended(), [Duration::ZERO, most])?;
         Ok((steps, viewers.seen()?))
