@@ -121,6 +121,12 @@ fn who_asks_first_leaves_the_wheel_to_others() {
     let asked = engineer.wait_for("wheel", |_| true);
     engineer.send(&json!({"hand_over": {"to": asked["asked_by"]}}));
     script.drive(wait).expect("handed over");
+    let refused = script.hand_over("c99", wait);
+    assert!(matches!(refused, Err(ClientError::Rejected { .. })), "{refused:?}");
+    script.hand_over(engineer.hello()["client"].as_str().expect("a name"), wait).expect("given");
+    engineer.wait_for("hello", |hello| hello["role"] == "driver");
+    let refused = script.hand_over("c1", wait);
+    assert!(matches!(refused, Err(ClientError::NotDriver { .. })), "{refused:?}");
     // Once nobody else is there it has the wheel as soon as it asks.
     drop((engineer, script));
     let script = Client::connect(&link, &on_request).expect("connected");

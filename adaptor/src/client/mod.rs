@@ -72,6 +72,7 @@ mod error;
 mod event;
 mod get;
 mod state;
+mod wheel;
 
 use std::{
     sync::{
@@ -79,7 +80,7 @@ use std::{
         atomic::{AtomicU64, Ordering},
     },
     thread::JoinHandle,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use serde::Deserialize;
@@ -101,8 +102,6 @@ use state::{Pending, Shared};
 
 /// Bytes of a reference surface.
 const SURFACE: usize = 1 << 30;
-/// How long the wheel is asked for again, while it is kept for a driver that was lost.
-const ASK_AGAIN: Duration = Duration::from_millis(300);
 /// How long closing may take: a server takes the message that is on its way, or is given up.
 const CLOSING: Duration = Duration::from_secs(12);
 
@@ -265,57 +264,6 @@ impl Client {
             }
         });
         found.unwrap_or_else(|| Err(no_answer("the question how far it is", patience)))
-    }
-
-    /// Asks for the wheel until it is there: at once where nobody drives, and after some seconds
-    /// where the last driver's connection was lost.
-    ///
-    /// # Errors
-    /// [`ClientError::NotDriver`] where somebody else drives, or after `patience`.
-    pub fn drive(&self, patience: Duration) -> Result<(), ClientError> {
-        let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
-        let hello = self.hello();
-        if hello.as_ref().is_some_and(|hello| hello.recording.is_some()) {
-            let reason = "this is a recording, of which nothing can be ordered".into();
-            return Err(ClientError::NotDriver { reason });
-        }
-        let may_drive = hello.is_none_or(|hello| hello.may_drive != Some(false));
-        loop {
-            if self.drives() {
-                return Ok(());
-            }
-            let id = self.id();
-            self.shared.with(|state| state.asked.insert(id.clone(), None));
-            let message = json!({"id": id, "drive": {}});
-            let left = until.saturating_duration_since(Instant::now());
-            let answered = self.transmit(id.clone(), &message).map(|()| {
-                self.shared.wait(left.max(ASK_AGAIN), |state| {
-                    let drives = state.hello.as_ref().is_some_and(|h| h.role == Role::Driver);
-                    let waits = state.pending.iter().any(|pending| pending.id == id);
-                    match &state.failure {
-                        Some(failure) => Some(Err(failure.clone())),
-                        None => (drives || !waits).then_some(Ok(drives)),
-                    }
-                })
-            });
-            // Where it was heard, the hello says so, and no answer has this id.
-            let answer = self.shared.with(|state| {
-                state.pending.retain(|pending| pending.id != id);
-                state.asked.remove(&id).flatten()
-            });
-            if answered?.unwrap_or(Ok(false))? {
-                return Ok(());
-            }
-            let reason = match answer {
-                Some(Event::Error(error)) => error.message,
-                _ => "nothing was said".into(),
-            };
-            let kept = may_drive && self.status().is_none_or(|status| status.driver.is_none());
-            if !kept || Instant::now() >= until {
-                return Err(ClientError::NotDriver { reason });
-            }
-            self.shared.wait(ASK_AGAIN, |state| state.failure.clone());
-        }
     }
 
     /// Sends a command; returns its id, which comes back in the answers to it: of an order in
