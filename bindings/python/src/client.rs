@@ -25,6 +25,10 @@ pub(crate) struct Client {
     process: u32,
 }
 
+/// An order that was read, with the numbers of the displacements whose files it names: to be sent.
+#[pyclass(frozen, module = "tombolo._native")]
+pub(crate) struct Prepared(Order);
+
 impl Drop for Client {
     fn drop(&mut self) {
         // A fork has not the thread that it would wait for.
@@ -198,24 +202,21 @@ impl Client {
         guarded(|| py.detach(|| self.client.drive(seconds(patience)).map_err(of_client)))
     }
 
+    /// An order or a list of edits, read.
+    fn prepare(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<Prepared> {
+        guarded(|| py.detach(|| self.order_of(text, name).map(Prepared)))
+    }
+
     /// Gives an order; returns its id.
-    fn order(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
-        guarded(|| {
-            py.detach(|| {
-                let order = self.order_of(text, name)?;
-                self.client.order(&order).map_err(of_client)
-            })
-        })
+    fn order(&self, py: Python<'_>, prepared: &Bound<'_, Prepared>) -> PyResult<String> {
+        let Prepared(order) = prepared.get();
+        guarded(|| py.detach(|| self.client.order(order).map_err(of_client)))
     }
 
     /// Asks for a forecast; returns the question's id.
-    fn forecast(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
-        guarded(|| {
-            py.detach(|| {
-                let order = self.order_of(text, name)?;
-                self.client.forecast(&order).map_err(of_client)
-            })
-        })
+    fn forecast(&self, py: Python<'_>, prepared: &Bound<'_, Prepared>) -> PyResult<String> {
+        let Prepared(order) = prepared.get();
+        guarded(|| py.detach(|| self.client.forecast(order).map_err(of_client)))
     }
 
     /// Takes the last orders back; returns the id of the order that does so.

@@ -31,6 +31,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<run::Run>()?;
     module.add_class::<motion::Motion>()?;
     module.add_class::<client::Client>()?;
+    module.add_class::<client::Prepared>()?;
     module.add_class::<shaper::Shaper>()?;
     module.add_function(wrap_pyfunction!(program, module)?)?;
     module.add_function(wrap_pyfunction!(lender::lent, module)?)?;

@@ -11,7 +11,7 @@ from typing import Any, Optional, TypeVar
 from . import _json, _native
 from ._names import unknown
 from ._reader import Reader
-from ._waiting import in_thread
+from ._waiting import Parts, in_thread
 from .errors import EndedError, WaitError
 from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
@@ -171,40 +171,40 @@ class Watched:
 
     def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status."""
+        return self._reader.carry_out(self._wait_for_cycle(cycle, timeout))
 
+    def _wait_for_cycle(self, cycle: int, timeout: Optional[float]) -> Parts[Status]:
         def found() -> Optional[Status]:
             return self._state.status if self._state.status is not None and self._state.status.cycle >= cycle else None
 
-        status = self.wait_for(found, timeout)
-        assert status is not None
+        status: Status = yield found, timeout
         return status
 
     def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
         """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
+        return self._reader.carry_out(self._wait_for_view(name, after, timeout))
 
+    def _wait_for_view(self, name: str, after: Optional[int], timeout: Optional[float]) -> Parts[View]:
         def found() -> Optional[View]:
             view = self._state.views.get(name)
             return view if view is not None and (after is None or view.cycle > after) else None
 
-        self._announced(name, timeout)
-        view = self.wait_for(found, timeout)
-        assert view is not None
+        if self.view_names and name not in self.view_names:
+            # A view that was added a moment ago is announced a moment later.
+            try:
+                yield (lambda: name in self.view_names), _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout)
+            except WaitError:
+                raise KeyError(unknown("view", name, self.view_names)) from None
+        view: View = yield found, timeout
         return view
-
-    def _announced(self, name: str, timeout: Optional[float] = None) -> None:
-        """An error where there is no view of a name, nor comes to be one."""
-        if not self.view_names or name in self.view_names:
-            return
-        # A view that was added a moment ago is announced a moment later.
-        try:
-            self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
-        except WaitError:
-            raise KeyError(unknown("view", name, self.view_names)) from None
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""
+        return self._reader.carry_out(self._wait_for_end(timeout))
+
+    def _wait_for_end(self, timeout: Optional[float]) -> Parts[dict[str, Any]]:
         try:
-            end = self.wait_for(lambda: self._state.end, timeout)
+            end = yield (lambda: self._state.end), timeout
         except EndedError:
             end = self._state.end
         return end or {"how": "unknown"}
