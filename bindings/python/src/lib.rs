@@ -7,6 +7,7 @@
 mod array;
 mod client;
 mod error;
+mod given;
 mod language;
 mod lender;
 mod motion;

@@ -22,6 +22,15 @@ Document = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Any]]
 Range = tuple[float, float, float]
 Condition = Literal["inflow", "outflow", "wall"]
 Given = TypeVar("Given")
+# The settings of a run, as the library takes them.
+_Given = tuple[
+    Optional[_json.Source],
+    Optional[_json.Source],
+    Optional[str],
+    list[tuple[str, float, float, float]],
+    list[tuple[str, str]],
+    Optional[str],
+]
 
 _CONDITIONS = "'inflow', 'outflow' or 'wall'"
 
@@ -211,6 +220,13 @@ class Adaptor:
     FailedError
         An address is in use, or a file cannot be written.
 
+    Notes
+    -----
+    On several ranks what is wrong on one is an error on all of them, of the same class. An exception that ends the
+    `with` block on one rank ends the run on the others too: their next `execute` raises `FailedError`. Where they wait
+    for that rank in messages of their own, ``python -m mpi4py solver.py`` ends them. `orders` and the orders of
+    `report` are told on rank 0 alone.
+
     Examples
     --------
     A solver of ten steps. An order squeezes its box at cycle 2, another restores it at cycle 6:
@@ -352,7 +368,7 @@ class Adaptor:
 
     @property
     def orders(self) -> list[dict[str, Any]]:
-        """The orders so far, and what became of each."""
+        """The orders so far, and what became of each; on several ranks they are told on rank 0 alone."""
         if self._run.ended:
             return list(self.report["orders"])
         orders: list[dict[str, Any]] = _json.loads(self._run.orders)
@@ -393,6 +409,8 @@ class Adaptor:
             self.finalize()
             return
         try:
+            if not self._run.ended:
+                self._run.leave(f"{type(error).__name__}: {error}")
             self.finalize()
         except Exception as other:
             # The first error says why the run is over.
