@@ -124,16 +124,18 @@ impl Client {
 #[pymethods]
 impl Client {
     #[new]
-    #[pyo3(signature = (link, views, watches, attempts))]
+    #[pyo3(signature = (link, views, watches, attempts, answer))]
     fn new(
         py: Python<'_>,
         link: &str,
         views: bool,
         watches: bool,
         attempts: u32,
+        answer: Option<f64>,
     ) -> PyResult<Self> {
         let link: Link = link.parse().map_err(|error: LinkError| of_client(error.into()))?;
-        let options = Options { views, watches, attempts, ..Options::default() };
+        let mut options = Options { views, watches, attempts, ..Options::default() };
+        options.answer = answer.map_or(options.answer, seconds);
         let connect = || client::Client::connect(&link, &options).map_err(of_client);
         let client = ManuallyDrop::new(guarded(|| py.detach(connect))?);
         Ok(Self { client, process: std::process::id() })

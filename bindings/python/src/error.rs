@@ -19,6 +19,7 @@ mod classes {
     pyo3::import_exception!(tombolo.errors, NotDriverError);
     pyo3::import_exception!(tombolo.errors, RejectedError);
     pyo3::import_exception!(tombolo.errors, StepError);
+    pyo3::import_exception!(tombolo.errors, WaitError);
 }
 
 pub(crate) use classes::*;
@@ -88,6 +89,7 @@ pub(crate) fn of_client(error: ClientError) -> PyErr {
         ClientError::Closed => EndedError::new_err(text),
         ClientError::NotDriver { .. } => NotDriverError::new_err(text),
         ClientError::Rejected { .. } => RejectedError::new_err(text),
+        ClientError::NoAnswer { .. } => WaitError::new_err(text),
         ClientError::TooMuch { .. } | ClientError::System { .. } => FailedError::new_err(text),
         _ => LinkError::new_err(text),
     }

@@ -27,11 +27,12 @@ _ANNOUNCED = 2.0
 class Watched:
     """What a client does that only watches; a `Run` steers too."""
 
-    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int) -> None:
+    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int, timeout: Optional[float]) -> None:
         self.link = link
         self._watch = watch
         self._state = State()
-        self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
+        client = in_thread(lambda: _native.Client(link, views, watch, attempts, timeout))
+        self._reader = Reader(client, self._state)
         self._callbacks = Callbacks(self._reader)
         # The thread that reads holds the reader: without this a run that nobody has any more would keep the wheel.
         weakref.finalize(self, self._reader.abandon).atexit = False
@@ -90,7 +91,13 @@ class Watched:
 
     @property
     def stack(self) -> list[dict[str, Any]]:
-        """The edits that make the present shape, the oldest first, as the run answers now."""
+        """The edits that make the present shape, the oldest first, as the run answers now.
+
+        Raises
+        ------
+        WaitError
+            It does not answer in time: see `connect`.
+        """
         edits: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.stack))
         return edits
 
@@ -127,12 +134,20 @@ class Watched:
         ------
         LinkError
             Where there is no mesh whose shape could be changed, or not yet.
+        WaitError
+            The run does not answer in time: see `connect`.
         """
         return Surface(**in_thread(self._reader.client.surface))
 
     @property
     def pipelines(self) -> list[dict[str, Any]]:
-        """The pipelines as they are now."""
+        """The pipelines as they are now.
+
+        Raises
+        ------
+        WaitError
+            The run does not answer in time: see `connect`.
+        """
         pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.pipelines))
         return pipelines
 

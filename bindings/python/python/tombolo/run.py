@@ -288,7 +288,14 @@ def _text(
     return _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other})
 
 
-def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: bool = True, attempts: int = 10) -> Run:
+def connect(
+    link: Union[str, os.PathLike[str]],
+    *,
+    watch: bool = False,
+    views: bool = True,
+    attempts: int = 10,
+    timeout: Optional[float] = None,
+) -> Run:
     """Connect to a run.
 
     Parameters
@@ -301,6 +308,9 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         Whether the frames of the live views are wanted.
     attempts : int
         How often a connection that is lost is tried to be made again, with growing pauses: 10 take about a minute.
+    timeout : float, optional
+        Seconds that the run may take to answer, now and to each question later (`Run.surface`, `stack`, `pipelines`).
+        Left out: 20 now, and 120 later, as a run may have a large surface to prepare.
 
     Returns
     -------
@@ -311,6 +321,8 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
     ------
     LinkError
         The run is not reached: the text says why.
+    WaitError
+        It does not answer within `timeout`.
 
     Examples
     --------
@@ -331,4 +343,5 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
-    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0))
+    patience = None if timeout is None else number(timeout, "timeout")
+    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0), timeout=patience)
