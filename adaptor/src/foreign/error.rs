@@ -42,10 +42,10 @@ pub enum RunError {
         expected: String,
     },
     /// Cells are wrong.
-    #[error("'{path}': {source}")]
+    #[error("{place}: {source}")]
     Cells {
-        /// The path.
-        path: String,
+        /// The path of their node, or words for them.
+        place: String,
         /// The mistake in them.
         source: MeshError,
     },

@@ -79,15 +79,25 @@ fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
     };
     let found = found.and_then(|found| Some((found, found.vertex_count()?)));
     found.ok_or_else(|| {
+        if is_curved(given, &text) {
+            let found = format!("cells of type '{text}'");
+            return argument(what, found, "linear cells: of PyVista's, mesh.linear_copy()").into();
+        }
         let names: Vec<&str> = known.map(|(cell_type, _)| cell_type.name()).collect();
         let near = nearest(&text, names.iter().copied());
         let near = near.map_or_else(String::new, |near| format!(" (did you mean '{near}'?)"));
-        argument(
-            what,
-            format!("cells of type '{text}'"),
-            format!("one of: {}{near}; or VTK's number of one", names.join(", ")),
-        )
+        let expected = format!("one of: {}{near}; or VTK's number of one", names.join(", "));
+        argument(what, format!("cells of type '{text}'"), expected).into()
     })
+}
+
+/// Whether a cell type is one of vertices on edges too: meshio calls it after a linear one and their
+/// number, and VTK counts it from 21 on.
+fn is_curved(given: &Given<'_>, text: &str) -> bool {
+    let name = text.trim_end_matches(|end: char| end.is_ascii_digit());
+    let is_named = name.len() < text.len()
+        && CellType::ALL.into_iter().any(|cell_type| cell_type.name() == name);
+    is_named || given.extract::<u8>().is_ok_and(|number| (21..=37).contains(&number))
 }
 
 impl Lender {
@@ -182,6 +192,12 @@ impl Lender {
             entries.iter().position(|[key, _]| key.eq(name).unwrap_or(false))
         };
         if named(OF_VTK[0], &entries).is_some() {
+            let is_known =
+                |key: &Given<'_>| OF_VTK.iter().any(|name| key.eq(name).unwrap_or(false));
+            if let Some([other, _]) = entries.iter().find(|[key, _]| !is_known(key)) {
+                let found = format!("'{other}' beside 'connectivity'");
+                return Err(argument(what, found, "'connectivity', 'offsets' and 'types'").into());
+            }
             let mut arrays = Vec::with_capacity(OF_VTK.len());
             for name in OF_VTK {
                 let missing = || {

@@ -1,11 +1,13 @@
 """What cannot be meant is told where it was given: what was found, and what is expected."""
 
 import asyncio
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 import tombolo
 from conftest import SQUEEZE, box
+from tombolo import _native
 
 POINTS, TETS = box(1)
 
@@ -47,6 +49,31 @@ def test_settings_of_an_adaptor():
         with pytest.raises(tombolo.ConfigurationError) as error:
             tombolo.Adaptor(**settings)
         assert text in str(error.value)
+
+
+def test_numbers_that_json_cannot_hold_have_their_place(run):
+    values = np.zeros((2, 3))
+    values[1, 2] = np.nan
+    edits = [{"translate": {}}, {"displacement": {"vertices": [0, 1], "values": values}}]
+    with pytest.raises(tombolo.ConfigurationError) as error:
+        run.order(edits)
+    assert str(error.value) == "order: [1].displacement.values[1][2]: found nan, expected a finite number"
+    with pytest.raises(tombolo.ConfigurationError, match=r"configuration: a\.b\[0\]: found inf, expected a finite"):
+        tombolo.Adaptor({"a": {"b": (np.inf,)}})
+    ring = []
+    ring.append(ring)
+    with pytest.raises(tombolo.ConfigurationError, match="expected what JSON can hold"):
+        run.order(ring)
+
+
+def test_what_is_no_communicator():
+    class Null:
+        def Get_size(self):
+            raise Exception("MPI_ERR_COMM: invalid communicator")
+
+    for given in (3, Null()):
+        with pytest.raises(tombolo.ConfigurationError, match=r"the communicator: found .*expected one of mpi4py"):
+            tombolo.Adaptor(communicator=given)
 
 
 def test_what_is_no_mesh_for_a_shaper():

@@ -271,7 +271,7 @@ impl Channel<'_> {
         let mut kept = Kept::default();
         kept.update(self, true)?;
         let mesh = kept.views(self, &mut Vec::new()).to_mesh();
-        mesh.map_err(|source| RunError::Cells { path: self.label.to_string(), source })
+        mesh.map_err(|source| RunError::Cells { place: self.label.place(), source })
     }
 }
 

@@ -161,6 +161,25 @@ class Steering(NamedTuple):
     parameters: Mapping[str, float]
 
 
+def _handle(communicator: Any) -> Optional[int]:
+    """The handle by which the library knows a communicator; None where this process is all of it."""
+    try:
+        size, handle = communicator.Get_size(), communicator.py2f()
+    except Exception as error:
+        # Of the null communicator and of one that was freed mpi4py raises what is no error of Python's own.
+        raise ConfigurationError(
+            f"the communicator: found {communicator!r} ({error}), expected one of mpi4py that this process is in"
+        ) from None
+    if _native.DISTRIBUTED:
+        return int(handle)
+    if size > 1:
+        raise ConfigurationError(
+            f"the communicator: found {size} ranks, and this package was built without MPI; "
+            "expected one that was built with the feature 'distributed'"
+        )
+    return None
+
+
 def _ranges(parameters: Optional[Mapping[str, Range]]) -> list[tuple[str, float, float, float]]:
     ranges = []
     for name, given in _named(parameters, "parameters", "(value, minimum, maximum)"):
@@ -264,25 +283,25 @@ class Adaptor:
         output: Optional[Union[str, os.PathLike[str]]] = None,
         communicator: Any = None,
     ) -> None:
-        handle = None
-        if communicator is not None:
-            size = communicator.Get_size()
-            if _native.DISTRIBUTED:
-                handle = communicator.py2f()
-            elif size > 1:
-                raise ConfigurationError(
-                    f"the communicator: found {size} ranks, and this package was built without MPI; "
-                    "expected one that was built with the feature 'distributed'"
-                )
-        self._run: _native.Run = _native.Run(
-            None if configuration is None else _json.source(configuration, "configuration"),
-            None if orders is None else _json.source(orders, "orders"),
-            None if replay is None else os.fspath(replay),
-            _ranges(parameters),
-            [(name, str(condition)) for name, condition in _named(conditions, "conditions", _CONDITIONS)],
-            None if output is None else os.fspath(output),
-            handle,
-        )
+        handle = None if communicator is None else _handle(communicator)
+        mistake: Optional[Exception] = None
+        given: _Given = (None, None, None, [], [], None)
+        try:
+            given = (
+                None if configuration is None else _json.source(configuration, "configuration"),
+                None if orders is None else _json.source(orders, "orders"),
+                None if replay is None else _json.file(replay, "replay"),
+                _ranges(parameters),
+                [(name, str(condition)) for name, condition in _named(conditions, "conditions", _CONDITIONS)],
+                None if output is None else _json.file(output, "output"),
+            )
+        except Exception as error:
+            mistake = error
+        try:
+            # What is wrong on one rank is told on all: the others would wait for it.
+            self._run: _native.Run = _native.Run(*given, handle, None if mistake is None else str(mistake))
+        except ConfigurationError as error:
+            raise error if mistake is None else mistake from None
         self._still = Steering(None, False, MappingProxyType(dict(self._run.parameters)))
 
     def execute(
