@@ -1,11 +1,24 @@
 """What is written in Rust: the classes of the package rest on it, and it may change from one version to the next."""
 
-from typing import Any, Optional
+from typing import Any, Optional, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._json import Source
+
+__all__ = [
+    "DISTRIBUTED",
+    "VERSION",
+    "Client",
+    "Motion",
+    "Prepared",
+    "Run",
+    "Shaper",
+    "check_configuration",
+    "lent",
+    "program",
+]
 
 VERSION: str
 DISTRIBUTED: bool
@@ -14,6 +27,7 @@ def program(arguments: list[str]) -> int: ...
 def lent(mesh: object) -> list[tuple[str, int, int, bool]]: ...
 def check_configuration(text: str, name: str) -> None: ...
 
+@final
 class Run:
     def __new__(
         cls,
@@ -47,6 +61,7 @@ class Run:
     @property
     def report(self) -> Optional[str]: ...
 
+@final
 class Motion:
     @property
     def coordinates(self) -> NDArray[np.float64]: ...
@@ -69,6 +84,7 @@ class Motion:
     @property
     def position(self) -> float: ...
 
+@final
 class Client:
     def __new__(cls, link: str, views: bool, watches: bool, attempts: int, answer: Optional[float]) -> Client: ...
     def next(self, patience: float) -> Optional[tuple[str, Any]]: ...
