@@ -115,8 +115,8 @@ pub struct Options {
     /// Whether the client only watches, whatever its link is for: it never has the wheel, also where
     /// nobody else is connected; `false` if left out.
     pub watches: bool,
-    /// How long the run may take to answer: each question of its own, and the first one, where this is
-    /// shorter than the 20 seconds that connecting may take anyway. A first surface is encoded then.
+    /// How long the run may take to answer a question; the first surface is encoded meanwhile. Where
+    /// it is less than 20 seconds, connecting takes no longer either.
     pub answer: Duration,
     /// How often a lost connection is tried to be made again, one after the other; 0 for never.
     pub attempts: u32,

@@ -97,7 +97,8 @@ pub(super) fn choice_of(text: &str) -> u64 {
 }
 
 /// Goes on where all ranks can; says too whether any rank says yes, and is an error where not all
-/// have the same `choice`: [`RunError::Choices`], or [`RunError::Ending`] where some are at the end.
+/// have the same `choice`: [`RunError::Choices`], or [`RunError::Ending`] where some are at the
+/// end.
 pub(super) fn agree_and_ask<T>(
     ranks: &dyn Communicator,
     mine: Result<T, RunError>,

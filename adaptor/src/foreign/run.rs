@@ -96,8 +96,8 @@ impl Run {
         self.adaptor.looks_at(step) || self.was_refused
     }
 
-    /// Whether a channel has to be read with its fields and features though [`Run::looks_at`] says no:
-    /// its mesh is not known yet, has another size, or lies in memory in another way than before.
+    /// Whether a channel has to be read with its fields and features though [`Run::looks_at`] says
+    /// no: its mesh is not known yet, has another size, or lies otherwise in memory than before.
     #[must_use]
     pub fn needs_whole(&self, channel: &Channel<'_>) -> bool {
         self.kept.get(&channel.name).is_none_or(|kept| !kept.suffices(channel))
@@ -335,9 +335,9 @@ impl Run {
         Ok(())
     }
 
-    /// Says that the solver has failed on this rank, which shows no step any more: the others, in the
-    /// next call of [`Run::execute`] or at the end, have it as an error and do not wait for it. Then
-    /// [`Run::finalize`] follows. Nothing where there is one rank.
+    /// Says that the solver has failed on this rank, which shows no step any more: the others have
+    /// it as an error of their next call, and do not wait for it. Then [`Run::finalize`] follows.
+    /// Nothing where there is one rank.
     pub fn leave(&mut self, reason: &str) {
         if self.communicator.size() > 1 {
             let _alarm = self.alarm();
@@ -345,8 +345,8 @@ impl Run {
         }
     }
 
-    /// Waits until all ranks are at the end. One that [leaves](Run::leave) says so first, and one that
-    /// shows a step is told; both come here next. Collective, by the same messages as a step.
+    /// Waits until all ranks are at the end. One that [leaves](Run::leave) says so first, and one
+    /// that shows a step is told; both come here next. Collective, by the same messages as a step.
     fn meet_at_end(&self) {
         while self.communicator.size() > 1 {
             let step = Step { cycle: 0, time: 0.0, time_step: 0.0 };

@@ -46,7 +46,7 @@ pub(crate) fn of_run(error: RunError) -> PyErr {
 pub(crate) enum Mistake {
     /// It makes no sense.
     Given(RunError),
-    /// Code of the caller's ran for it, and was interrupted or had no memory: that is no mistake in it.
+    /// Code of the caller's ran for it, and was interrupted or had no memory: no mistake of its own.
     Raised(PyErr),
 }
 

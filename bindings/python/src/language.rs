@@ -21,10 +21,9 @@ pub(crate) fn check_configuration(py: Python<'_>, text: &str, name: &str) -> PyR
 /// An order of a new shape or a list of edits; `name` is what errors call the text, and where files
 /// that edits name are looked for.
 pub(crate) fn order(text: &str, name: &str) -> PyResult<Order> {
+    let expected = r#"an order of a new shape, {"edits": [...]}, or a list of edits, [{...}]"#;
     let wrong = |found: &str| {
-        ConfigurationError::new_err(format!(
-            "{name}: found {found}, expected an order of a new shape, {{\"edits\": [...]}}, or a list of edits, [{{...}}]"
-        ))
+        ConfigurationError::new_err(format!("{name}: found {found}, expected {expected}"))
     };
     let content = check_content(text, name, None).map_err(|errors| match unlike_an_order(text) {
         Some(found) => wrong(&found),

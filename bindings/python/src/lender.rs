@@ -91,8 +91,8 @@ fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
     })
 }
 
-/// Whether a cell type is one of vertices on edges too: meshio calls it after a linear one and their
-/// number, and VTK counts it from 21 on.
+/// Whether a cell type has vertices on its edges too: meshio calls it after a linear one and how
+/// many there are, and VTK counts it from 21 on.
 fn is_curved(given: &Given<'_>, text: &str) -> bool {
     let name = text.trim_end_matches(|end: char| end.is_ascii_digit());
     let is_named = name.len() < text.len()

@@ -173,7 +173,9 @@ fn conditions(given: Vec<(String, String)>) -> Result<BTreeMap<String, Condition
 #[pymethods]
 impl Run {
     #[new]
-    #[pyo3(signature = (configuration, orders, replay, parameters, conditions, output, communicator, mistake))]
+    #[pyo3(signature = (
+        configuration, orders, replay, parameters, conditions, output, communicator, mistake
+    ))]
     #[allow(clippy::too_many_arguments, reason = "Python names each")]
     fn new(
         py: Python<'_>,

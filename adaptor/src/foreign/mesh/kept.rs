@@ -137,7 +137,7 @@ impl Kept {
         Ok(is_other)
     }
 
-    /// Whether what is kept and what can be lent are the whole mesh, where nobody looks at its values.
+    /// Whether what is kept and what can be lent are the whole mesh, where nobody looks at values.
     pub(crate) fn suffices(&self, channel: &Channel<'_>) -> bool {
         let counts = counts(channel);
         let single = channel.single();
