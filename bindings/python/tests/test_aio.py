@@ -178,7 +178,8 @@ def test_many_waits_hold_no_threads(run):
 
     run.drive()
     held, seconds, ended = asyncio.run(work())
-    assert held == 0 and seconds < 4
+    # With a thread for each, six at a time, it took seventeen seconds.
+    assert held <= 0 and seconds < 10, (held, seconds)
     assert all(isinstance(error, tombolo.WaitError) and "1.0 seconds" in str(error) for error in ended)
     assert run._reader._tells == []
 

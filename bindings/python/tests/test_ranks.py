@@ -82,6 +82,19 @@ def test_the_ranks_of_any_communicator_change_their_shape(tmp_path, ranks, size,
         assert told["orders"] == (["applied", "applied"] if is_first else []), told
 
 
+NULL = """
+try:
+    tombolo.Adaptor(communicator=MPI.COMM_NULL)
+except tombolo.ConfigurationError as error:
+    tell(text=str(error))
+"""
+
+
+def test_the_null_communicator_is_told():
+    (told,) = told_by(NULL, 1)
+    assert told["text"].startswith("the communicator: found") and "expected one of mpi4py" in told["text"]
+
+
 FAILING = """
 mine = world.rank == world.size - 1
 points, mesh = slab(world.rank)
