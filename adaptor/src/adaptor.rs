@@ -204,7 +204,10 @@ impl Adaptor {
     pub fn initialize(mut settings: Settings) -> Result<Self, InitializeError> {
         let communicator = Arc::clone(&settings.communicator);
         let _alarm = Alarm::among(&communicator);
-        let own = serde_json::to_vec(&(&settings.config, &settings.orders, &settings.replay));
+        let own = serde_json::to_vec(&(
+            (&settings.config, &settings.orders, &settings.replay),
+            (&settings.parameters, &settings.conditions),
+        ));
         let continued = Continued::of(&mut settings)?;
         let mut run = random_name().into_bytes();
         communicator.broadcast(0, &mut run);
@@ -212,16 +215,19 @@ impl Adaptor {
         if communicator.size() == 1 {
             return adaptor;
         }
-        let adaptor = agree(&*communicator, adaptor)?;
+        let is_mistake = adaptor.as_ref().is_err_and(InitializeError::is_mistake);
+        let is_mistake = communicator.any(is_mistake);
+        let adaptor = agree(&*communicator, adaptor);
+        let adaptor = if is_mistake { adaptor.map_err(InitializeError::Given)? } else { adaptor? };
         let own = own.unwrap_or_default();
         let mut first = own.clone();
         communicator.broadcast(0, &mut first);
         let same = if own == first {
             Ok(())
         } else {
-            Err("its configuration or its orders are not those of rank 0")
+            Err("its configuration, orders, parameters or conditions are not those of rank 0")
         };
-        agree(&*communicator, same)?;
+        agree(&*communicator, same).map_err(InitializeError::Given)?;
         Ok(adaptor)
     }
 

@@ -41,10 +41,24 @@ pub enum InitializeError {
     /// One of the commands given beforehand makes no sense.
     #[error("the orders given beforehand: {0}")]
     Orders(Problems),
-    /// Something is wrong on one rank, or the ranks were given different configurations. All ranks
-    /// have this error.
+    /// Something is wrong on one rank. All ranks have this error.
     #[error(transparent)]
     Rank(#[from] RankError),
+    /// What one rank was given makes no sense, or the ranks were given different things. All ranks
+    /// have this error.
+    #[error(transparent)]
+    Given(RankError),
+}
+
+impl InitializeError {
+    /// Whether what was given makes no sense, rather than that something could not be done.
+    #[must_use]
+    pub fn is_mistake(&self) -> bool {
+        matches!(
+            self,
+            Self::Configuration(_) | Self::Orders(_) | Self::Parameter(_) | Self::Given(_)
+        )
+    }
 }
 
 /// A mistake of the solver. Nothing was changed; it may go on and call again.
@@ -114,6 +128,9 @@ pub enum ExecuteError {
     /// something is wrong.
     #[error(transparent)]
     Rank(#[from] RankError),
+    /// As [`ExecuteError::Rank`], where what is wrong is a mesh or a field that was lent.
+    #[error(transparent)]
+    Lent(RankError),
     /// The ranks have come to different cycles.
     #[error(
         "the ranks call execute for cycles from {lowest} to {highest}; expected the same cycle on all of them"
@@ -151,6 +168,20 @@ pub enum ExecuteError {
         /// How many there were.
         expected: usize,
     },
+}
+
+impl ExecuteError {
+    /// Whether a mesh or a field that was lent makes no sense, rather than the step itself.
+    #[must_use]
+    pub fn is_of_lent(&self) -> bool {
+        matches!(
+            self,
+            Self::Channel { .. }
+                | Self::OtherCells { .. }
+                | Self::VertexCount { .. }
+                | Self::Lent(_)
+        )
+    }
 }
 
 /// The faults of a run that did not stop it.

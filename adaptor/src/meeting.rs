@@ -14,7 +14,7 @@ use crate::{
 ///
 /// # Errors
 /// One of these, on all ranks: [`ExecuteError::Cycles`], [`ExecuteError::Times`], or
-/// [`ExecuteError::Rank`] with the fault of the lowest rank that has one.
+/// [`ExecuteError::Rank`] or [`ExecuteError::Lent`] with the fault of the lowest rank that has one.
 pub(crate) fn meet(
     communicator: &dyn Communicator,
     moment: Moment,
@@ -22,7 +22,11 @@ pub(crate) fn meet(
     called: bool,
     outside: Outside,
 ) -> Result<(bool, Outside), ExecuteError> {
-    let told = fault.map(|fault| fault.to_string().into_bytes());
+    let told = fault.map(|fault| {
+        let mut told = vec![u8::from(fault.is_of_lent())];
+        told.extend_from_slice(fault.to_string().as_bytes());
+        told
+    });
     let (cycle, time) = (moment.cycle, position_of(moment.time));
     let called = if communicator.rank() == 0 { packed(called, outside) } else { 0 };
     let mut said = [u64::from(told.is_some()), called, cycle, !cycle, time, !time];
@@ -30,11 +34,12 @@ pub(crate) fn meet(
     let [failing, called, highest, lowest, latest, earliest] = said;
     let (lowest, latest, earliest) = (!lowest, number_at(latest), number_at(!earliest));
     if failing > 0
-        && let Some((rank, message)) = first_failure(communicator, 0, told)
+        && let Some((rank, told)) = first_failure(communicator, 0, told)
     {
-        return Err(
-            RankError { rank, message: String::from_utf8_lossy(&message).into_owned() }.into()
-        );
+        let message = String::from_utf8_lossy(told.get(1..).unwrap_or_default()).into_owned();
+        let error = RankError { rank, message };
+        let is_of_lent = told.first() == Some(&1);
+        return Err(if is_of_lent { ExecuteError::Lent(error) } else { error.into() });
     }
     if highest != lowest {
         return Err(ExecuteError::Cycles { lowest, highest });

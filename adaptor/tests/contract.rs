@@ -241,7 +241,7 @@ fn run(
                 }
             }
             outcome = wrong.with(|channels| match adaptor.execute(&step, channels) {
-                Err(error @ (ExecuteError::Channel { .. } | ExecuteError::Rank(_))) => {
+                Err(error @ (ExecuteError::Channel { .. } | ExecuteError::Lent(_))) => {
                     Err(error.to_string())
                 }
                 Err(error) => panic!("{error}"),

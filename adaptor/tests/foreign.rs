@@ -7,7 +7,7 @@ use tombolo::communicator::{Communicator, threads};
 use tombolo::deform::mesh::CellType;
 use tombolo::deform::shapes::box_of_tets;
 use tombolo::foreign::mesh::{Block, Channel, Coordset, Domain, Label, Mask, Roles, Topology};
-use tombolo::foreign::{Array, NumberType, Run, Shown};
+use tombolo::foreign::{Array, Kind, NumberType, Run, Shown};
 use tombolo::pipelines::language;
 use tombolo::{OrderReport, OrderStatus, Settings, Step};
 
@@ -198,5 +198,48 @@ fn cells_that_come_in_another_form_are_the_same_cells() {
         }
         assert!(moved > 0);
         assert_eq!(run.orders()[0].status, OrderStatus::Applied, "{:?}", run.orders());
+    }
+}
+
+#[test]
+fn a_rank_that_leaves_or_ends_early_holds_none_up() {
+    for (leaves, expected) in
+        [(true, "the solver has failed: no memory"), (false, "the run was ended on other ranks")]
+    {
+        let outcomes = threads::run(3, |ranks| {
+            let is_last = ranks.rank() == 2;
+            let lower = ranks.rank() as f64;
+            let communicator: Arc<dyn Communicator> = Arc::new(ranks);
+            let mut run =
+                Run::new(Settings { communicator, ..Settings::default() }).expect("a run");
+            let mesh = box_of_tets([2, 2, 2], [lower, 0.0, 0.0], [lower + 1.0, 1.0, 1.0]);
+            let mut refused = None;
+            for cycle in 0..5 {
+                if is_last && cycle == 2 {
+                    break;
+                }
+                let step = Step { cycle, time: 0.1 * cycle as f64, time_step: 0.1 };
+                let looked_at = run.looks_at(&step);
+                let channels = vec![channel(mesh.points(), mesh.cells().connectivity())];
+                if let Err(error) = run.execute(Ok(Shown { step, looked_at, channels })) {
+                    refused = Some((cycle, error.kind(), error.to_string()));
+                    break;
+                }
+            }
+            if leaves {
+                run.leave("no memory");
+            }
+            let (report, ended) = run.finalize();
+            ended.expect("the end");
+            (refused, report.cycles)
+        });
+        let [first, second, last] = outcomes.try_into().expect("three ranks");
+        assert_eq!(last, (None, 2));
+        let kind = if leaves { Kind::Failure } else { Kind::Step };
+        for (refused, cycles) in [first, second] {
+            let (cycle, found, said) = refused.expect("an error in place of a wait");
+            assert_eq!((cycle, found, cycles), (2, kind, 2));
+            assert!(said.contains(expected), "{said}");
+        }
     }
 }

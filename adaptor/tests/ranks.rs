@@ -505,7 +505,8 @@ fn a_run_does_not_begin_with_different_configurations() {
         Adaptor::initialize(settings).map(drop).map_err(|error| error.to_string())
     });
     let expected =
-        Err("rank 1: its configuration or its orders are not those of rank 0".to_owned());
+        Err("rank 1: its configuration, orders, parameters or conditions are not those of rank 0"
+            .to_owned());
     assert_eq!(outcomes, [expected.clone(), expected]);
 }
 

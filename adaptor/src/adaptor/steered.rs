@@ -102,7 +102,7 @@ impl Adaptor {
         if self.communicator.size() == 1 {
             checked?;
         } else {
-            agree(&*self.communicator, checked)?;
+            agree(&*self.communicator, checked).map_err(ExecuteError::Lent)?;
         }
         self.mesh = if self.config.stream.is_none()
             && self.timed.is_empty()

@@ -17,8 +17,9 @@ use tokio_tungstenite::{
 use tombolo_pipelines::{encode::Decoder, limits::DOCUMENT};
 
 use super::{
-    ClientError, Drives, Event, Link, Options,
+    ClientError, Event, Link, Options,
     get::{is_encrypted, not_tombolo, open, refused, shown},
+    no_answer,
     state::Shared,
 };
 use crate::{
@@ -55,7 +56,7 @@ enum Over {
 
 /// Keeps the connection until the run has ended, the owner lets go, or it cannot be made again.
 pub(super) async fn run(link: &Link, options: &Options, shared: &Arc<Shared>) -> ClientError {
-    let mut socket = match until_closing(shared, join(link, options.drives, shared)).await {
+    let mut socket = match until_closing(shared, join(link, options, shared)).await {
         Some(Ok(socket)) => socket,
         Some(Err(error)) => return error,
         None => return ClientError::Closed,
@@ -98,7 +99,7 @@ async fn again(
     for _ in 0..options.attempts {
         sleep(pause).await;
         pause = pause.saturating_mul(2).min(options.longest_pause);
-        match join(link, options.drives, shared).await {
+        match join(link, options, shared).await {
             Ok(socket) => return Ok(socket),
             // Another run listens there now.
             Err(
@@ -113,16 +114,23 @@ async fn again(
 }
 
 /// Connects and waits for the hello.
-async fn join(link: &Link, drives: Drives, shared: &Shared) -> Result<Socket, ClientError> {
+async fn join(link: &Link, options: &Options, shared: &Shared) -> Result<Socket, ClientError> {
     let before = shared.with(|state| state.hello.clone());
     let is_plain = |text: &str| text.chars().all(|c| c.is_ascii_alphanumeric());
     let name = before.as_ref().map(|hello| hello.client.as_str()).filter(|name| is_plain(name));
     let back = before.as_ref().and_then(|hello| hello.back.as_deref()).filter(|it| is_plain(it));
     let stream = open(link).await?;
     let wrong = |found: String| not_tombolo(link, found);
-    let late = || wrong(format!("no answer within {} seconds", HELLO.as_secs()));
+    let patience = HELLO.min(options.answer);
+    let late = || {
+        if patience < HELLO {
+            no_answer("the request for a connection", patience)
+        } else {
+            wrong(format!("no answer within {} seconds", HELLO.as_secs()))
+        }
+    };
     let mut request = link
-        .socket(drives.role(), name, back)
+        .socket(options.drives.role(), name, back)
         .into_client_request()
         .map_err(|error| wrong(error.to_string()))?;
     if let Ok(value) = HeaderValue::from_str(&format!("Bearer {}", link.token())) {
@@ -130,7 +138,7 @@ async fn join(link: &Link, drives: Drives, shared: &Shared) -> Result<Socket, Cl
     }
     let limits =
         WebSocketConfig::default().max_message_size(Some(MESSAGE)).max_frame_size(Some(MESSAGE));
-    let shaken = timeout(HELLO, client_async_with_config(request, stream, Some(limits))).await;
+    let shaken = timeout(patience, client_async_with_config(request, stream, Some(limits))).await;
     let mut socket = match shaken.map_err(|_| late())? {
         Ok((socket, _)) => socket,
         Err(Error::Http(response)) => {
@@ -152,7 +160,7 @@ async fn join(link: &Link, drives: Drives, shared: &Shared) -> Result<Socket, Cl
         }
         Err(error) => return Err(wrong(shown(error.to_string().as_bytes()))),
     };
-    let first = timeout(HELLO, first_text(&mut socket)).await.map_err(|_| late())?;
+    let first = timeout(patience, first_text(&mut socket)).await.map_err(|_| late())?;
     let text = match first {
         Ok(text) => text,
         Err(Some(close)) if u16::from(close.code) == 1013 => {

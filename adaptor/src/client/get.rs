@@ -11,8 +11,6 @@ use super::{ClientError, Link};
 use crate::dial::{DialError, Stream, dial};
 use crate::link::Way;
 
-/// How long an answer may take as a whole. The first request for a surface has it encoded.
-const ANSWER: Duration = Duration::from_secs(120);
 /// How long it may take to hear whether something is encrypted.
 const PROBE: Duration = Duration::from_secs(5);
 /// How an alert of TLS begins.
@@ -96,12 +94,8 @@ pub(super) async fn get(
     let mut stream = open(link).await?;
     let not_tombolo = |found: String| not_tombolo(link, found);
     let asked = link.path(path) + query;
-    let bytes = timeout(ANSWER, exchange(&mut *stream, link, &asked, HEAD.saturating_add(most)));
-    let bytes = match bytes.await {
-        Ok(Ok(bytes)) => bytes,
-        Ok(Err(error)) => return Err(not_tombolo(format!("no answer ({error})"))),
-        Err(_) => return Err(not_tombolo(format!("no answer within {} s", ANSWER.as_secs()))),
-    };
+    let bytes = exchange(&mut *stream, link, &asked, HEAD.saturating_add(most)).await;
+    let bytes = bytes.map_err(|error| not_tombolo(format!("no answer ({error})")))?;
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];
     let mut response = httparse::Response::new(&mut headers);
     let head = match response.parse(&bytes) {

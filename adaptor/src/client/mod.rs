@@ -136,6 +136,9 @@ pub struct Options {
     pub views: bool,
     /// When the client is the one that drives; [`Drives::IfFree`] if left out.
     pub drives: Drives,
+    /// How long the run may take to answer a question; the first surface is encoded meanwhile. Where
+    /// it is less than 20 seconds, connecting takes no longer either.
+    pub answer: Duration,
     /// How often a lost connection is tried to be made again, one after the other; 0 for never.
     pub attempts: u32,
     /// The pause before the first attempt; each next one is twice as long.
@@ -145,11 +148,12 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// No views, and ten attempts within about a minute.
+    /// No views, answers within two minutes, and ten attempts within about one.
     fn default() -> Self {
         Self {
             views: false,
             drives: Drives::IfFree,
+            answer: Duration::from_secs(120),
             attempts: 10,
             first_pause: Duration::from_millis(250),
             longest_pause: Duration::from_secs(10),
@@ -162,6 +166,8 @@ impl Default for Options {
 /// See the [module](self) for an example.
 pub struct Client {
     link: Link,
+    /// How long an answer may take.
+    answer: Duration,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     /// The prefix of this client's ids, which no other client uses.
@@ -183,6 +189,7 @@ impl Client {
             .build()
             .map_err(|error| system(error.to_string()))?;
         let shared = Arc::new(Shared::default());
+        let answer = options.answer;
         let (on_thread, of, options) = (Arc::clone(&shared), link.clone(), options.clone());
         let serve = move || {
             let failure = runtime.block_on(connection::run(&of, &options, &on_thread));
@@ -193,7 +200,8 @@ impl Client {
         let thread = std::thread::Builder::new().name("tombolo-client".into()).spawn(serve);
         let thread = Some(thread.map_err(|error| system(error.to_string()))?);
         let mark = u32::from_le_bytes(mark);
-        let client = Self { link: link.clone(), shared, thread, mark, count: AtomicU64::new(0) };
+        let (link, count) = (link.clone(), AtomicU64::new(0));
+        let client = Self { link, answer, shared, thread, mark, count };
         let joined = client.shared.wait(Duration::MAX, |state| match &state.hello {
             Some(_) => Some(Ok(())),
             None => state.failure.clone().map(Err),
@@ -361,7 +369,7 @@ impl Client {
     /// The pipelines as they are now, a JSON list.
     ///
     /// # Errors
-    /// [`ClientError`] where the answer is none.
+    /// [`ClientError`] where the answer is none, or comes later than [`Options::answer`].
     pub fn pipelines(&self) -> Result<Value, ClientError> {
         let body = self.get("pipelines", "", DOCUMENT.most)?;
         serde_json::from_slice(&body).map_err(|error| self.wrong(&error))
@@ -371,7 +379,7 @@ impl Client {
     /// the stack changes meanwhile it is asked for anew.
     ///
     /// # Errors
-    /// [`ClientError`] where the answer is none.
+    /// [`ClientError`] where the answer is none, or comes later than [`Options::answer`].
     pub fn stack(&self) -> Result<Vec<Edit>, ClientError> {
         #[derive(Deserialize)]
         struct Answer {
@@ -410,7 +418,7 @@ impl Client {
     ///
     /// # Errors
     /// [`ClientError::Answer`] with the status 404 as long as there is no mesh whose shape could be
-    /// changed.
+    /// changed; [`ClientError::NoAnswer`] after [`Options::answer`].
     pub fn surface(&self) -> Result<Surface, ClientError> {
         let body = self.get("surface", "", SURFACE)?;
         decode_surface(&body).map_err(|error| self.wrong(&error))
@@ -425,9 +433,11 @@ impl Client {
     fn get(&self, path: &'static str, query: &str, most: usize) -> Result<Vec<u8>, ClientError> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.map_err(|error| ClientError::System { reason: error.to_string() })?;
-        let answer = runtime.block_on(get::get(&self.link, path, query, most));
+        let asked = get::get(&self.link, path, query, most);
+        let answered = runtime.block_on(async { tokio::time::timeout(self.answer, asked).await });
         runtime.shutdown_background();
-        let answer = answer?;
+        let late = |_| no_answer(&format!("the question for its {path}"), self.answer);
+        let answer = answered.map_err(late)??;
         match answer.status {
             200 => Ok(answer.body),
             status => Err(get::refused(&self.link, path, status, &answer.body)),

@@ -6,6 +6,19 @@ use tombolo_pipelines::language::{LanguageErrors, ReadError};
 
 use crate::{CheckpointError, ExecuteError, FinalizeError, InitializeError};
 
+/// What an error is about, as classes of errors tell it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A configuration, orders, a parameter or a condition.
+    Configuration,
+    /// A mesh or a field.
+    Mesh,
+    /// A step.
+    Step,
+    /// Something that could not be done.
+    Failure,
+}
+
 /// Why a run did not begin, or a call of it was refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -29,10 +42,10 @@ pub enum RunError {
         expected: String,
     },
     /// Cells are wrong.
-    #[error("'{path}': {source}")]
+    #[error("{place}: {source}")]
     Cells {
-        /// The path.
-        path: String,
+        /// The path of their node, or words for them.
+        place: String,
         /// The mistake in them.
         source: MeshError,
     },
@@ -46,6 +59,16 @@ pub enum RunError {
         /// The values that it can have.
         expected: String,
     },
+    /// A number of the step makes no sense.
+    #[error("{what}: found {found}; expected {expected}")]
+    Step {
+        /// `cycle`, `time` or `time_step`.
+        what: &'static str,
+        /// Its value.
+        found: String,
+        /// The values that it can have.
+        expected: &'static str,
+    },
     /// The configuration cannot be read.
     #[error("{0}")]
     Configuration(String),
@@ -56,9 +79,17 @@ pub enum RunError {
         rank: usize,
         /// Its error.
         message: String,
+        /// The kind of its error.
+        kind: Kind,
         /// Whether [`RunError::is_failure`] of its error.
         is_failure: bool,
     },
+    /// Ranks are at the end of the run, and others are not.
+    #[error("the run was ended on other ranks; expected the same call on all")]
+    Ending,
+    /// The solver has failed on this rank.
+    #[error("the solver has failed: {0}")]
+    Left(String),
     /// Ranks let different pipelines run.
     #[error(
         "the pipelines that are to run: found other names on other ranks; expected the same on all"
@@ -104,12 +135,31 @@ impl RunError {
         }
     }
 
+    /// What the error is about: the same on all ranks.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match self {
+            RunError::Rank { kind, .. } => *kind,
+            RunError::Configuration(_) => Kind::Configuration,
+            RunError::Initialize(error) if error.is_mistake() => Kind::Configuration,
+            RunError::Execute(error) if error.is_of_lent() => Kind::Mesh,
+            RunError::Step { .. } | RunError::Execute(_) | RunError::Choices | RunError::Ending => {
+                Kind::Step
+            }
+            error if error.is_failure() => Kind::Failure,
+            _ => Kind::Mesh,
+        }
+    }
+
     /// Whether the run could not do what it was told, rather than was given what makes no sense.
     #[must_use]
     pub fn is_failure(&self) -> bool {
         match self {
             RunError::Rank { is_failure, .. } => *is_failure,
-            RunError::Initialize(_) | RunError::Finalize(_) | RunError::Checkpoint(_) => true,
+            RunError::Initialize(_)
+            | RunError::Finalize(_)
+            | RunError::Checkpoint(_)
+            | RunError::Left(_) => true,
             _ => false,
         }
     }

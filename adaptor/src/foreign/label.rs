@@ -34,6 +34,14 @@ impl Label {
         self.part(below, &format!("field '{name}'"))
     }
 
+    /// The label as errors begin with it: a path in quotes, and words as they are.
+    pub(super) fn place(&self) -> String {
+        match self {
+            Self::Path(path) => format!("'{path}'"),
+            Self::Words(words) => words.clone(),
+        }
+    }
+
     /// The error that something else was found than is needed.
     #[must_use]
     pub fn wrong(&self, found: impl ToString, expected: impl ToString) -> RunError {

@@ -16,5 +16,5 @@ mod run;
 
 pub use array::{Array, NumberType, conduit_type};
 pub use asked::Asked;
-pub use error::RunError;
+pub use error::{Kind, RunError};
 pub use run::{Run, Shown};

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 use tombolo_deform::communicator::{Communicator, Reduction, Solo, first_failure};
 
 use crate::fingerprint::hash;
-use crate::foreign::error::RunError;
+use crate::foreign::error::{Kind, RunError};
 
 /// In place of a communicator's handle: all ranks there are, with MPI or without.
 #[cfg(feature = "distributed")]
@@ -88,13 +88,17 @@ pub fn agree_on(
     }
 }
 
+/// In place of a choice: this rank is at the end of the run.
+pub(super) const ENDING: u64 = u64::MAX;
+
 /// A number by which ranks compare what they choose: never 0, which is no choice.
 pub(super) fn choice_of(text: &str) -> u64 {
     hash(text.bytes()).max(1)
 }
 
 /// Goes on where all ranks can; says too whether any rank says yes, and is an error where not all
-/// have the same `choice`.
+/// have the same `choice`: [`RunError::Choices`], or [`RunError::Ending`] where some are at the
+/// end.
 pub(super) fn agree_and_ask<T>(
     ranks: &dyn Communicator,
     mine: Result<T, RunError>,
@@ -107,14 +111,15 @@ pub(super) fn agree_and_ask<T>(
     let mut said = [u64::from(mine.is_err()), u64::from(yes), choice, u64::MAX - choice];
     ranks.reduce_integers(Reduction::Maximum, &mut said);
     let [failing, any, highest, lowest] = said;
-    let told = mine
-        .as_ref()
-        .err()
-        .map(|error| format!("{} {error}", u8::from(error.is_failure())).into_bytes());
+    let told = mine.as_ref().err().map(|error| {
+        let mut told = vec![error.kind() as u8, u8::from(error.is_failure())];
+        told.extend_from_slice(error.to_string().as_bytes());
+        told
+    });
     let failure = if failing > 0 { first_failure(ranks, 0, told) } else { None };
     let Some((rank, bytes)) = failure else {
         if highest != u64::MAX - lowest {
-            return Err(RunError::Choices);
+            return Err(if highest == ENDING { RunError::Ending } else { RunError::Choices });
         }
         return mine.map(|mine| (mine, any > 0));
     };
@@ -122,9 +127,15 @@ pub(super) fn agree_and_ask<T>(
     match mine {
         Err(error) if rank == ranks.rank() => Err(error),
         _ => {
-            let told = String::from_utf8_lossy(&bytes).into_owned();
-            let (is_failure, message) = told.split_once(' ').unwrap_or(("0", told.as_str()));
-            Err(RunError::Rank { rank, message: message.into(), is_failure: is_failure == "1" })
+            let (told, message) = bytes.split_at_checked(2).unwrap_or_default();
+            let kinds = [Kind::Configuration, Kind::Mesh, Kind::Step, Kind::Failure];
+            let is_of = |kind: &Kind| told.first() == Some(&(*kind as u8));
+            Err(RunError::Rank {
+                rank,
+                message: String::from_utf8_lossy(message).into_owned(),
+                kind: kinds.into_iter().find(is_of).unwrap_or(Kind::Failure),
+                is_failure: told.last() == Some(&1),
+            })
         }
     }
 }

@@ -96,6 +96,13 @@ impl Run {
         self.adaptor.looks_at(step) || self.was_refused
     }
 
+    /// Whether a channel has to be read with its fields and features though [`Run::looks_at`] says
+    /// no: its mesh is not known yet, has another size, or lies otherwise in memory than before.
+    #[must_use]
+    pub fn needs_whole(&self, channel: &Channel<'_>) -> bool {
+        self.kept.get(&channel.name).is_none_or(|kept| !kept.suffices(channel))
+    }
+
     /// Saves the state of the run in a file: see [`Adaptor::write_checkpoint`]. Collective.
     ///
     /// # Errors
@@ -328,8 +335,32 @@ impl Run {
         Ok(())
     }
 
+    /// Says that the solver has failed on this rank, which shows no step any more: the others have
+    /// it as an error of their next call, and do not wait for it. Then [`Run::finalize`] follows.
+    /// Nothing where there is one rank.
+    pub fn leave(&mut self, reason: &str) {
+        if self.communicator.size() > 1 {
+            let _alarm = self.alarm();
+            let _ = self.execute(Err(RunError::Left(reason.to_owned())));
+        }
+    }
+
+    /// Waits until all ranks are at the end. One that [leaves](Run::leave) says so first, and one
+    /// that shows a step is told; both come here next. Collective, by the same messages as a step.
+    fn meet_at_end(&self) {
+        while self.communicator.size() > 1 {
+            let step = Step { cycle: 0, time: 0.0, time_step: 0.0 };
+            let nothing = self.cover(Ok(Shown { step, looked_at: false, channels: Vec::new() }));
+            let met = ranks::agree_and_ask(&*self.communicator, nothing, false, ranks::ENDING);
+            if met.is_ok() {
+                break;
+            }
+        }
+    }
+
     /// Ends the run. Collective. The report is there even where a file could not be written.
     pub fn finalize(self) -> (Report, Result<(), RunError>) {
+        self.meet_at_end();
         match self.adaptor.finalize() {
             Ok(report) => (report, Ok(())),
             Err(error) => {

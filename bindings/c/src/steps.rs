@@ -39,10 +39,10 @@ fn orders(run: &Opened) -> Vec<OrderReport> {
 fn check_cycle(cycle: u64) -> Result<(), RunError> {
     match cycle.cast_signed() {
         0.. => Ok(()),
-        negative => Err(RunError::Argument {
-            what: "cycle".into(),
+        negative => Err(RunError::Step {
+            what: "cycle",
             found: negative.to_string(),
-            expected: "a whole number from 0 on".into(),
+            expected: "a whole number from 0 on",
         }),
     }
 }

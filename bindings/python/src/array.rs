@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use tombolo::foreign::{Array, NumberType, RunError};
 
-use crate::error::argument;
+use crate::error::{Mistake, argument, raised};
 
 /// The most axes of an array that is lent.
 const AXES: usize = 3;
@@ -137,7 +137,7 @@ fn shown(shape: &[usize]) -> String {
 }
 
 /// Refuses an array that says of some of its numbers that they are none.
-fn require_unmasked(array: &Bound<'_, PyUntypedArray>, what: &str) -> Result<(), RunError> {
+fn require_unmasked(array: &Bound<'_, PyUntypedArray>, what: &str) -> Result<(), Mistake> {
     // Only a class of its own has a mask.
     if array.is_exact_instance_of::<PyUntypedArray>() {
         return Ok(());
@@ -148,8 +148,10 @@ fn require_unmasked(array: &Bound<'_, PyUntypedArray>, what: &str) -> Result<(),
         .and_then(|is_masked| is_masked.call1((array,))?.is_truthy());
     match is_masked {
         Ok(false) => Ok(()),
-        Ok(true) => Err(argument(what, "an array of which values are masked", "a value for each")),
-        Err(error) => Err(argument(what, error, "an array of numbers")),
+        Ok(true) => {
+            Err(argument(what, "an array of which values are masked", "a value for each").into())
+        }
+        Err(error) => Err(raised(error, |error| argument(what, error, "an array of numbers"))),
     }
 }
 
@@ -157,7 +159,7 @@ fn require_unmasked(array: &Bound<'_, PyUntypedArray>, what: &str) -> Result<(),
 pub(crate) fn as_array<'py>(
     given: &Bound<'py, PyAny>,
     what: &str,
-) -> Result<Bound<'py, PyUntypedArray>, RunError> {
+) -> Result<Bound<'py, PyUntypedArray>, Mistake> {
     if let Ok(array) = given.cast::<PyUntypedArray>() {
         require_unmasked(array, what)?;
         return Ok(array.clone());
@@ -168,7 +170,9 @@ pub(crate) fn as_array<'py>(
         .and_then(|asarray| asarray.call1((given,)))
         .and_then(|made| made.cast_into::<PyUntypedArray>().map_err(PyErr::from));
     made.map_err(|error| {
-        let kind = given.get_type();
-        argument(what, format!("a {kind} that makes no array ({error})"), "an array of numbers")
+        raised(error, |error| {
+            let found = format!("a {} that makes no array ({error})", given.get_type());
+            argument(what, found, "an array of numbers")
+        })
     })
 }

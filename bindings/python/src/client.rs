@@ -25,6 +25,10 @@ pub(crate) struct Client {
     process: u32,
 }
 
+/// An order that was read, with the numbers of the displacements whose files it names: to be sent.
+#[pyclass(frozen, module = "tombolo._native")]
+pub(crate) struct Prepared(Order);
+
 impl Drop for Client {
     fn drop(&mut self) {
         // A fork has not the thread that it would wait for.
@@ -120,18 +124,20 @@ impl Client {
 #[pymethods]
 impl Client {
     #[new]
-    #[pyo3(signature = (link, views, watches, attempts))]
+    #[pyo3(signature = (link, views, watches, attempts, answer))]
     fn new(
         py: Python<'_>,
         link: &str,
         views: bool,
         watches: bool,
         attempts: u32,
+        answer: Option<f64>,
     ) -> PyResult<Self> {
         let link: Link = link.parse().map_err(|error: LinkError| of_client(error.into()))?;
         // A script that only reads must not keep others from driving: it has the wheel once it commands.
         let drives = if watches { Drives::Never } else { Drives::OnRequest };
-        let options = Options { views, drives, attempts, ..Options::default() };
+        let mut options = Options { views, drives, attempts, ..Options::default() };
+        options.answer = answer.map_or(options.answer, seconds);
         let connect = || client::Client::connect(&link, &options).map_err(of_client);
         let client = ManuallyDrop::new(guarded(|| py.detach(connect))?);
         Ok(Self { client, process: std::process::id() })
@@ -200,24 +206,21 @@ impl Client {
         guarded(|| py.detach(|| self.client.drive(seconds(patience)).map_err(of_client)))
     }
 
+    /// An order or a list of edits, read.
+    fn prepare(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<Prepared> {
+        guarded(|| py.detach(|| self.order_of(text, name).map(Prepared)))
+    }
+
     /// Gives an order; returns its id.
-    fn order(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
-        guarded(|| {
-            py.detach(|| {
-                let order = self.order_of(text, name)?;
-                self.client.order(&order).map_err(of_client)
-            })
-        })
+    fn order(&self, py: Python<'_>, prepared: &Bound<'_, Prepared>) -> PyResult<String> {
+        let Prepared(order) = prepared.get();
+        guarded(|| py.detach(|| self.client.order(order).map_err(of_client)))
     }
 
     /// Asks for a forecast; returns the question's id.
-    fn forecast(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
-        guarded(|| {
-            py.detach(|| {
-                let order = self.order_of(text, name)?;
-                self.client.forecast(&order).map_err(of_client)
-            })
-        })
+    fn forecast(&self, py: Python<'_>, prepared: &Bound<'_, Prepared>) -> PyResult<String> {
+        let Prepared(order) = prepared.get();
+        guarded(|| py.detach(|| self.client.forecast(order).map_err(of_client)))
     }
 
     /// Takes the last orders back; returns the id of the order that does so.

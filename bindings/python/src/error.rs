@@ -2,10 +2,12 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use pyo3::exceptions::{PyException, PyMemoryError};
 use pyo3::prelude::*;
 use tombolo::client::ClientError;
-use tombolo::foreign::RunError;
-use tombolo::{ExecuteError, InitializeError, pipelines::language::LanguageErrors};
+use tombolo::foreign::{Kind, RunError};
+use tombolo::pipelines::extract::ChannelError;
+use tombolo::pipelines::language::LanguageErrors;
 
 mod classes {
     pyo3::import_exception!(tombolo.errors, CallError);
@@ -17,6 +19,7 @@ mod classes {
     pyo3::import_exception!(tombolo.errors, NotDriverError);
     pyo3::import_exception!(tombolo.errors, RejectedError);
     pyo3::import_exception!(tombolo.errors, StepError);
+    pyo3::import_exception!(tombolo.errors, WaitError);
 }
 
 pub(crate) use classes::*;
@@ -30,22 +33,50 @@ pub(crate) fn guarded<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
 
 pub(crate) fn of_run(error: RunError) -> PyErr {
     let text = error.to_string();
-    match error {
-        RunError::Configuration(_)
-        | RunError::Initialize(
-            InitializeError::Configuration(_)
-            | InitializeError::Orders(_)
-            | InitializeError::Parameter(_),
-        ) => ConfigurationError::new_err(text),
-        RunError::Execute(
-            ExecuteError::Channel { .. }
-            | ExecuteError::OtherCells { .. }
-            | ExecuteError::VertexCount { .. },
-        ) => MeshError::new_err(text),
-        RunError::Execute(_) | RunError::Choices => StepError::new_err(text),
-        error if error.is_failure() => FailedError::new_err(text),
-        _ => MeshError::new_err(text),
+    match error.kind() {
+        Kind::Configuration => ConfigurationError::new_err(text),
+        Kind::Mesh => MeshError::new_err(text),
+        Kind::Step => StepError::new_err(text),
+        Kind::Failure => FailedError::new_err(text),
     }
+}
+
+/// Why what was given cannot be taken.
+#[derive(Debug)]
+pub(crate) enum Mistake {
+    /// It makes no sense.
+    Given(RunError),
+    /// Code of the caller's ran for it, and was interrupted or had no memory: no mistake of its own.
+    Raised(PyErr),
+}
+
+impl From<RunError> for Mistake {
+    fn from(error: RunError) -> Self {
+        Self::Given(error)
+    }
+}
+
+impl From<ChannelError> for Mistake {
+    fn from(error: ChannelError) -> Self {
+        Self::Given(error.into())
+    }
+}
+
+impl From<Mistake> for PyErr {
+    fn from(mistake: Mistake) -> Self {
+        match mistake {
+            Mistake::Given(error) => of_run(error),
+            Mistake::Raised(error) => error,
+        }
+    }
+}
+
+/// What an error of Python's says of an argument, as far as it is of the argument.
+pub(crate) fn raised(error: PyErr, mistake: impl FnOnce(&PyErr) -> RunError) -> Mistake {
+    let is_of_argument = Python::attach(|py| {
+        error.is_instance_of::<PyException>(py) && !error.is_instance_of::<PyMemoryError>(py)
+    });
+    if is_of_argument { Mistake::Given(mistake(&error)) } else { Mistake::Raised(error) }
 }
 
 pub(crate) fn of_language(errors: impl Into<LanguageErrors>) -> PyErr {
@@ -58,6 +89,7 @@ pub(crate) fn of_client(error: ClientError) -> PyErr {
         ClientError::Closed => EndedError::new_err(text),
         ClientError::NotDriver { .. } => NotDriverError::new_err(text),
         ClientError::Rejected { .. } => RejectedError::new_err(text),
+        ClientError::NoAnswer { .. } => WaitError::new_err(text),
         ClientError::TooMuch { .. } | ClientError::System { .. } => FailedError::new_err(text),
         _ => LinkError::new_err(text),
     }

@@ -5,18 +5,19 @@ use std::sync::Arc;
 use numpy::PyUntypedArray;
 use pyo3::intern;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyMapping, PyString, PyTuple};
+use pyo3::types::{PyList, PyMapping, PyString, PyTuple};
 use tombolo::deform::mesh::{CellType, Vector};
 use tombolo::foreign::mesh::{
     Block, COMPONENTS, Channel, Coordset, Domain, Faces, Field, Label, Lending, Mask, Roles, Rows,
     Topology,
 };
-use tombolo::foreign::{Array, NumberType, RunError};
+use tombolo::foreign::{Array, NumberType};
 use tombolo::pipelines::extract::{Association, check_field_length};
 use tombolo::pipelines::language::nearest;
 
 use crate::array::{Layout, as_array};
-use crate::error::{argument, of_run};
+use crate::error::argument;
+use crate::given::{Given, MESH, Read, entries, is_mapping, is_mesh, name, part, python};
 
 /// The parts of a mesh, as the class `tombolo.Mesh` and a dict call them.
 const PARTS: [&str; 8] = [
@@ -44,15 +45,15 @@ pub(crate) struct Lender {
 pub(crate) struct Channels<'call>(pub(crate) Vec<Channel<'call>>);
 
 impl Channels<'_> {
-    /// How many coordinates a vertex of each channel has.
-    pub(crate) fn dimensions(&self) -> Vec<(String, usize)> {
+    /// The name of each channel, and how many coordinates a vertex of it has.
+    pub(crate) fn dimensions(&self) -> impl Iterator<Item = (&str, usize)> {
         let dimension = |channel: &Channel<'_>| {
             channel.blocks.first().map_or(3, |block| match &block.domain.coordset {
                 Coordset::Explicit { axes } => axes.len(),
                 _ => 3,
             })
         };
-        self.0.iter().map(|channel| (channel.name.clone(), dimension(channel))).collect()
+        self.0.iter().map(move |channel| (channel.name.as_str(), dimension(channel)))
     }
 }
 
@@ -60,61 +61,10 @@ impl Channels<'_> {
 // them. Whoever changes a solver's arrays while it shows them breaks the solver's own promise.
 unsafe impl Send for Channels<'_> {}
 
-type Given<'py> = Bound<'py, PyAny>;
-type Read<T> = Result<T, RunError>;
+/// Whether somebody looks at the fields and features of a channel, of which the rest is lent.
+type Reads<'a> = &'a dyn Fn(&Channel<'_>) -> bool;
 /// Faces by the numbers of their features, and the names of those.
 type NamedFaces<'call> = (Vec<Faces<'call>>, Vec<(i64, String)>);
-
-fn kind(given: &Given<'_>) -> String {
-    format!("a {}", given.get_type())
-}
-
-/// What was given, as Python writes it, or the beginning of that.
-pub(crate) fn found(given: &Given<'_>) -> String {
-    let text = given.repr().map_or_else(|_| kind(given), |text| text.to_string());
-    text.chars().take(100).collect()
-}
-
-fn python(what: &str) -> impl Fn(PyErr) -> RunError + '_ {
-    move |error| argument(what, error.to_string(), "what can be read")
-}
-
-fn name(given: &Given<'_>, what: &str) -> Read<String> {
-    let name = given.cast::<PyString>().ok().map(|name| name.to_string_lossy().into_owned());
-    name.filter(|name| !name.is_empty() && !name.chars().any(char::is_control))
-        .ok_or_else(|| argument(what, found(given), "a name of one letter or more, on one line"))
-}
-
-/// The entries of a mapping.
-fn entries<'py>(given: &Given<'py>, what: &str, expected: &str) -> Read<Vec<[Given<'py>; 2]>> {
-    if let Ok(dict) = given.cast::<PyDict>() {
-        return Ok(dict.iter().map(|(key, value)| [key, value]).collect());
-    }
-    let mapping = given.cast::<PyMapping>().map_err(|_| argument(what, kind(given), expected))?;
-    let items = mapping.items().map_err(python(what))?;
-    items
-        .iter()
-        .map(|item| {
-            let (key, value) = item.extract().map_err(python(what))?;
-            Ok([key, value])
-        })
-        .collect()
-}
-
-/// A part of a mesh; `None` where it is left out.
-fn part<'py>(
-    mesh: &Given<'py>,
-    what: &str,
-    name: &Bound<'py, PyString>,
-) -> Read<Option<Given<'py>>> {
-    let found = match mesh.cast::<PyDict>() {
-        Ok(dict) => dict.get_item(name).map_err(python(what))?,
-        Err(_) => Some(mesh.getattr(name).map_err(|_| {
-            argument(what, kind(mesh), "a tombolo.Mesh, or a dict with 'points' and 'cells'")
-        })?),
-    };
-    Ok(found.filter(|found| !found.is_none()))
-}
 
 /// A cell type by VTK's number or by its name.
 fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
@@ -129,15 +79,25 @@ fn cell_type(given: &Given<'_>, what: &str) -> Read<(CellType, usize)> {
     };
     let found = found.and_then(|found| Some((found, found.vertex_count()?)));
     found.ok_or_else(|| {
+        if is_curved(given, &text) {
+            let found = format!("cells of type '{text}'");
+            return argument(what, found, "linear cells: of PyVista's, mesh.linear_copy()").into();
+        }
         let names: Vec<&str> = known.map(|(cell_type, _)| cell_type.name()).collect();
         let near = nearest(&text, names.iter().copied());
         let near = near.map_or_else(String::new, |near| format!(" (did you mean '{near}'?)"));
-        argument(
-            what,
-            format!("cells of type '{text}'"),
-            format!("one of: {}{near}; or VTK's number of one", names.join(", ")),
-        )
+        let expected = format!("one of: {}{near}; or VTK's number of one", names.join(", "));
+        argument(what, format!("cells of type '{text}'"), expected).into()
     })
+}
+
+/// Whether a cell type has vertices on its edges too: meshio calls it after a linear one and how
+/// many there are, and VTK counts it from 21 on.
+fn is_curved(given: &Given<'_>, text: &str) -> bool {
+    let name = text.trim_end_matches(|end: char| end.is_ascii_digit());
+    let is_named = name.len() < text.len()
+        && CellType::ALL.into_iter().any(|cell_type| cell_type.name() == name);
+    is_named || given.extract::<u8>().is_ok_and(|number| (21..=37).contains(&number))
 }
 
 impl Lender {
@@ -154,7 +114,7 @@ impl Lender {
         let layout = self.layout(given, what)?;
         if layout.axes != 1 {
             let found = format!("an array of shape {}", layout.shape_text());
-            return Err(argument(what, found, "an array of one axis"));
+            return Err(argument(what, found, "an array of one axis").into());
         }
         // SAFETY: this keeps the array alive, and the caller of `Run.execute` leaves it as it is.
         Ok(unsafe { layout.component(0, 0) })
@@ -178,7 +138,7 @@ impl Lender {
             let first = arrays.first().map_or(0, Array::len);
             if let Some(other) = arrays.iter().find(|array| array.len() != first) {
                 let found = format!("components of {first} and of {} values", other.len());
-                return Err(argument(what, found, "components of one length"));
+                return Err(argument(what, found, "components of one length").into());
             }
             return Ok(arrays);
         }
@@ -187,7 +147,7 @@ impl Lender {
         if layout.axes == 0 || rows * columns > COMPONENTS {
             let found = format!("an array of shape {}", layout.shape_text());
             let expected = format!("(n,), or (n, k) of at most {COMPONENTS} components");
-            return Err(argument(what, found, expected));
+            return Err(argument(what, found, expected).into());
         }
         let every = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
         // SAFETY: as in `list`; the components are those of the shape.
@@ -205,11 +165,13 @@ impl Lender {
         if layout.axes != 2 || layout.shape[1] != vertices {
             let found = format!("an array of shape {}", layout.shape_text());
             let expected = format!("(m, {vertices}), a row for each {cell_type}");
-            return Err(argument(what, found, expected));
+            return Err(argument(what, found, expected).into());
         }
         if layout.number.is_real() && layout.shape[0] > 0 {
             let found = format!("an array of {}", layout.number.name());
-            return Err(argument(what, found, "vertex numbers: int32, int64 or another integer"));
+            return Err(
+                argument(what, found, "vertex numbers: int32, int64 or another integer").into()
+            );
         }
         // SAFETY: as in `list`.
         let connectivity = unsafe { layout.table() };
@@ -230,6 +192,12 @@ impl Lender {
             entries.iter().position(|[key, _]| key.eq(name).unwrap_or(false))
         };
         if named(OF_VTK[0], &entries).is_some() {
+            let is_known =
+                |key: &Given<'_>| OF_VTK.iter().any(|name| key.eq(name).unwrap_or(false));
+            if let Some([other, _]) = entries.iter().find(|[key, _]| !is_known(key)) {
+                let found = format!("'{other}' beside 'connectivity'");
+                return Err(argument(what, found, "'connectivity', 'offsets' and 'types'").into());
+            }
             let mut arrays = Vec::with_capacity(OF_VTK.len());
             for name in OF_VTK {
                 let missing = || {
@@ -240,12 +208,12 @@ impl Lender {
                 arrays.push(self.list(value, &format!("{what}, {name}"))?);
             }
             let [connectivity, offsets, types] = arrays[..] else {
-                return Err(argument(what, "other arrays", "three"));
+                return Err(argument(what, "other arrays", "three").into());
             };
             if offsets.len() != types.len() + 1 {
                 let found = format!("{} offsets of {} cells", offsets.len(), types.len());
                 let expected = "one more offset than there are cells, the first of them 0";
-                return Err(argument(what, found, expected));
+                return Err(argument(what, found, expected).into());
             }
             let map = CellType::ALL.into_iter().filter(|of| *of != CellType::Polyhedron);
             return Ok(Topology::Mixed {
@@ -278,7 +246,7 @@ impl Lender {
             let what = format!("{what}['{part}']");
             names.push((*number, part));
             let mut topologies = Vec::new();
-            if value.cast::<PyDict>().is_ok() {
+            if value.cast::<PyMapping>().is_ok() {
                 for [key, value] in entries(&value, &what, expected)? {
                     let of = cell_type(&key, &what)?;
                     topologies.push(self.uniform(of, &value, format!("{what}['{key}']"))?);
@@ -332,113 +300,138 @@ impl Lender {
                 "element" => Association::Element,
                 other => {
                     let found = format!("the association '{other}'");
-                    return Err(argument(what, found, "'vertex' or 'element'"));
+                    return Err(argument(what, found, "'vertex' or 'element'").into());
                 }
             },
             None if length == vertices && length == cells && length > 0 => {
                 let found = format!("{length} values, as many as there are vertices and cells");
                 let expected =
                     "tombolo.Field(values, 'vertex') or tombolo.Field(values, 'element')";
-                return Err(argument(what, found, expected));
+                return Err(argument(what, found, expected).into());
             }
             None if length == vertices => Association::Vertex,
             None if length == cells => Association::Element,
             None => {
                 let expected = format!("{vertices} for its vertices, or {cells} for its cells");
-                return Err(argument(what, format!("{length} values"), expected));
+                return Err(argument(what, format!("{length} values"), expected).into());
             }
         };
         check_field_length(channel, (&field, association), length, counts)?;
         Ok(Field::new(field, association, components))
     }
 
-    fn channel<'call>(&mut self, channel: String, mesh: &Given<'_>) -> Read<Channel<'call>> {
+    /// A channel, whose fields and features are lent where somebody `reads` it.
+    fn channel<'call>(
+        &mut self,
+        channel: String,
+        mesh: &Given<'_>,
+        reads: Reads<'_>,
+    ) -> Read<Channel<'call>> {
         let py = mesh.py();
         let path = format!("channel '{channel}'");
-        if let Ok(dict) = mesh.cast::<PyDict>() {
-            for key in dict.keys() {
+        if is_mapping(mesh, &path)? {
+            for [key, _] in entries(mesh, &path, MESH)? {
                 let key = key.to_string();
                 if !PARTS.contains(&key.as_str()) {
                     let near = nearest(&key, PARTS).map_or_else(
                         || format!("one of: {}", PARTS.join(", ")),
                         |near| format!("one of: {} (did you mean '{near}'?)", PARTS.join(", ")),
                     );
-                    return Err(argument(path, format!("the part '{key}'"), near));
+                    return Err(argument(path, format!("the part '{key}'"), near).into());
                 }
             }
         }
         let points = part(mesh, &path, intern!(py, "points"))?;
         let points = points.ok_or_else(|| argument(&path, "no points", "an array (n, 3)"))?;
-        let what = format!("{path}, points");
-        let axes = self.components(&points, &what)?;
-        if !(2..=3).contains(&axes.len()) {
-            let found = format!("{} coordinate(s) for each vertex", axes.len());
-            return Err(argument(what, found, "2 or 3: an array (n, 2) or (n, 3)"));
-        }
+        let axes = self.axes(&points, &format!("{path}, points"))?;
         let coordset = Coordset::Explicit { axes };
         let vertices = coordset.vertex_count();
         let cells = part(mesh, &path, intern!(py, "cells"))?;
         let topology = self.topology(cells.as_ref(), vertices, &format!("{path}, cells"))?;
-        let counts = (vertices, topology.cell_count());
-        let mut fields = Vec::new();
-        if let Some(given) = part(mesh, &path, intern!(py, "fields"))? {
-            let what = format!("{path}, fields");
-            for entry in entries(&given, &what, "a dict from names to arrays")? {
-                fields.push(self.field(&channel, &entry, counts)?);
-            }
-        }
-        let (faces, feature_names) = match part(mesh, &path, intern!(py, "faces"))? {
-            Some(given) => self.faces(&given, &format!("{path}, faces"))?,
-            None => Default::default(),
-        };
-        let mut list = |name: &Bound<'_, PyString>| -> Read<Option<Array<'call>>> {
-            let given = part(mesh, &path, name)?;
-            given.map(|given| self.list(&given, &format!("{path}, {name}"))).transpose()
-        };
-        let roles = Roles {
-            ghosts: list(intern!(py, "ghost_cells"))?,
-            global_vertices: list(intern!(py, "global_vertices"))?,
-            global_cells: list(intern!(py, "global_cells"))?,
-            vertex_features: list(intern!(py, "vertex_features"))?,
-        };
         let label = Label::Words(path);
-        let domain = Domain { coordset, topology, fields, faces, roles, label: label.clone() };
-        Ok(Channel {
+        let domain = Domain {
+            coordset,
+            topology,
+            fields: Vec::new(),
+            faces: Vec::new(),
+            roles: Roles::default(),
+            label: label.clone(),
+        };
+        let mut channel = Channel {
             name: channel,
             blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
-            feature_names,
             label,
             ..Channel::default()
-        })
+        };
+        if reads(&channel) {
+            self.lend_rest(&mut channel, mesh)?;
+        }
+        Ok(channel)
     }
 
-    /// Coordinates, copied; 0 along an axis that is not given.
-    pub(crate) fn points(&mut self, given: &Given<'_>, what: &str) -> Read<Vec<Vector>> {
+    /// Lends what a channel has beside its points and cells.
+    fn lend_rest<'call>(&mut self, channel: &mut Channel<'call>, mesh: &Given<'_>) -> Read<()> {
+        let py = mesh.py();
+        let Channel { name, blocks, feature_names, label, .. } = channel;
+        let path = label.to_string();
+        for Block { domain, .. } in blocks {
+            let counts = (domain.coordset.vertex_count(), domain.topology.cell_count());
+            if let Some(given) = part(mesh, &path, intern!(py, "fields"))? {
+                let what = format!("{path}, fields");
+                for entry in entries(&given, &what, "a dict from names to arrays")? {
+                    domain.fields.push(self.field(name, &entry, counts)?);
+                }
+            }
+            if let Some(given) = part(mesh, &path, intern!(py, "faces"))? {
+                (domain.faces, *feature_names) = self.faces(&given, &format!("{path}, faces"))?;
+            }
+            let mut list = |name: &Bound<'_, PyString>| -> Read<Option<Array<'call>>> {
+                let given = part(mesh, &path, name)?;
+                given.map(|given| self.list(&given, &format!("{path}, {name}"))).transpose()
+            };
+            domain.roles = Roles {
+                ghosts: list(intern!(py, "ghost_cells"))?,
+                global_vertices: list(intern!(py, "global_vertices"))?,
+                global_cells: list(intern!(py, "global_cells"))?,
+                vertex_features: list(intern!(py, "vertex_features"))?,
+            };
+        }
+        Ok(())
+    }
+
+    /// The coordinates of vertices, along two or three axes.
+    fn axes<'call>(&mut self, given: &Given<'_>, what: &str) -> Read<Vec<Array<'call>>> {
         let axes = self.components(given, what)?;
         if !(2..=3).contains(&axes.len()) {
             let found = format!("{} coordinate(s) for each vertex", axes.len());
-            return Err(argument(what, found, "2 or 3: an array (n, 2) or (n, 3)"));
+            return Err(argument(what, found, "2 or 3: an array (n, 2) or (n, 3)").into());
         }
+        Ok(axes)
+    }
+
+    /// Coordinates, copied, and along how many axes they are given; 0 along the others.
+    pub(crate) fn points(&mut self, given: &Given<'_>, what: &str) -> Read<(Vec<Vector>, usize)> {
+        let axes = self.axes(given, what)?;
         let at = |row: usize| {
             std::array::from_fn(|axis| axes.get(axis).map_or(0.0, |along| along.get(row)))
         };
-        Ok((0..axes.first().map_or(0, Array::len)).map(at).collect())
+        Ok(((0..axes.first().map_or(0, Array::len)).map(at).collect(), axes.len()))
     }
 
     /// The channels of a step: one mesh, or a dict from names to meshes.
-    pub(crate) fn channels<'call>(&mut self, given: &Given<'_>) -> Read<Channels<'call>> {
-        let points = intern!(given.py(), "points");
-        let is_mesh = match given.cast::<PyDict>() {
-            Ok(dict) => dict.contains(points).unwrap_or(false),
-            Err(_) => given.hasattr(points).unwrap_or(false),
-        };
-        if is_mesh {
-            return Ok(Channels(vec![self.channel("mesh".to_owned(), given)?]));
+    /// Their fields and features are lent where somebody `reads` them.
+    pub(crate) fn channels<'call>(
+        &mut self,
+        given: &Given<'_>,
+        reads: Reads<'_>,
+    ) -> Read<Channels<'call>> {
+        if is_mesh(given)? {
+            return Ok(Channels(vec![self.channel("mesh".to_owned(), given, reads)?]));
         }
         let expected = "a tombolo.Mesh, or a dict from names to meshes";
         let channels = entries(given, "channels", expected)?.into_iter().map(|[key, mesh]| {
             let name = name(&key, "the name of a channel")?;
-            self.channel(name, &mesh)
+            self.channel(name, &mesh, reads)
         });
         channels.collect::<Read<_>>().map(Channels)
     }
@@ -449,7 +442,7 @@ impl Lender {
 #[pyfunction]
 pub(crate) fn lent(mesh: &Given<'_>) -> PyResult<Vec<(String, usize, usize, bool)>> {
     let mut lender = Lender::default();
-    let channels = lender.channels(mesh).map_err(of_run)?;
+    let channels = lender.channels(mesh, &|_| true)?;
     let mut found = Vec::new();
     for block in channels.0.iter().flat_map(|channel| &channel.blocks) {
         found.extend(block.domain.lending().into_iter().map(

@@ -7,6 +7,7 @@
 mod array;
 mod client;
 mod error;
+mod given;
 mod language;
 mod lender;
 mod motion;
@@ -31,6 +32,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<run::Run>()?;
     module.add_class::<motion::Motion>()?;
     module.add_class::<client::Client>()?;
+    module.add_class::<client::Prepared>()?;
     module.add_class::<shaper::Shaper>()?;
     module.add_function(wrap_pyfunction!(program, module)?)?;
     module.add_function(wrap_pyfunction!(lender::lent, module)?)?;

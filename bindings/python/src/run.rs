@@ -1,6 +1,6 @@
 //! A run of a solver in Python, on which the class `tombolo.Adaptor` rests.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
@@ -10,10 +10,9 @@ use tombolo::foreign::{self, RunError, Shown, ranks};
 use tombolo::pipelines::language;
 use tombolo::{Condition, ExecuteError, Parameter, Settings, Stopper};
 
-use crate::error::{
-    CallError, ConfigurationError, FailedError, StepError, argument, guarded, of_run,
-};
-use crate::lender::{Channels, Lender, found};
+use crate::error::{CallError, FailedError, Mistake, guarded, of_run, raised};
+use crate::given::found;
+use crate::lender::{Channels, Lender};
 use crate::motion::Motion;
 
 /// The motion that is asked for, whether to stop, and the parameters where they have changed.
@@ -30,6 +29,8 @@ struct State {
     stage: Stage,
     /// The parameters as Python was told of them.
     told: BTreeMap<String, f64>,
+    /// How many coordinates a vertex of each channel has.
+    dimensions: HashMap<String, usize>,
 }
 
 /// A run under way.
@@ -109,11 +110,14 @@ fn step(
     cycle: &Bound<'_, PyAny>,
     time: &Bound<'_, PyAny>,
     time_step: &Bound<'_, PyAny>,
-) -> Result<tombolo::Step, RunError> {
-    let number = |name, given: &Bound<'_, PyAny>| {
-        given.extract().map_err(|_| argument(name, found(given), "a number"))
+) -> Result<tombolo::Step, Mistake> {
+    let wrong = |what, given: &Bound<'_, PyAny>, expected, error: PyErr| {
+        raised(error, |_| RunError::Step { what, found: found(given), expected })
     };
-    let whole = |_| argument("cycle", found(cycle), "a whole number from 0 on");
+    let number = |what, given: &Bound<'_, PyAny>| {
+        given.extract().map_err(|error| wrong(what, given, "a number", error))
+    };
+    let whole = |error| wrong("cycle", cycle, "a whole number from 0 on", error);
     Ok(tombolo::Step {
         cycle: cycle.extract().map_err(whole)?,
         time: number("time", time)?,
@@ -154,12 +158,12 @@ fn settings(
 }
 
 /// What features are to the flow, as Python names it.
-fn conditions(given: Vec<(String, String)>) -> PyResult<BTreeMap<String, Condition>> {
+fn conditions(given: Vec<(String, String)>) -> Result<BTreeMap<String, Condition>, RunError> {
     let condition = |(feature, word): (String, String)| match word.as_str() {
         "inflow" => Ok((feature, Condition::Inflow)),
         "outflow" => Ok((feature, Condition::Outflow)),
         "wall" => Ok((feature, Condition::Wall)),
-        other => Err(ConfigurationError::new_err(format!(
+        other => Err(RunError::Configuration(format!(
             "condition of '{feature}': found '{other}', expected 'inflow', 'outflow' or 'wall'"
         ))),
     };
@@ -169,7 +173,9 @@ fn conditions(given: Vec<(String, String)>) -> PyResult<BTreeMap<String, Conditi
 #[pymethods]
 impl Run {
     #[new]
-    #[pyo3(signature = (configuration, orders, replay, parameters, conditions, output, communicator))]
+    #[pyo3(signature = (
+        configuration, orders, replay, parameters, conditions, output, communicator, mistake
+    ))]
     #[allow(clippy::too_many_arguments, reason = "Python names each")]
     fn new(
         py: Python<'_>,
@@ -180,13 +186,17 @@ impl Run {
         conditions: Vec<(String, String)>,
         output: Option<PathBuf>,
         communicator: Option<i32>,
+        mistake: Option<String>,
     ) -> PyResult<Self> {
-        let conditions = self::conditions(conditions)?;
         let begin = || -> Result<foreign::Run, RunError> {
             // SAFETY: of a communicator of mpi4py, which is alive during the call.
             let communicator = unsafe { ranks::communicator(communicator) }?;
-            let settings = settings(configuration, orders, replay);
-            let settings = ranks::agree(&*communicator, settings)?;
+            // Refused on all ranks, what is wrong on one: the others would wait for it.
+            let given = mistake.map_or(Ok(()), |mistake| Err(RunError::Configuration(mistake)));
+            let given = given.and_then(|()| {
+                Ok((settings(configuration, orders, replay)?, self::conditions(conditions)?))
+            });
+            let (settings, conditions) = ranks::agree(&*communicator, given)?;
             let parameters = parameters
                 .into_iter()
                 .map(|(name, value, minimum, maximum)| Parameter { name, value, minimum, maximum });
@@ -207,6 +217,7 @@ impl Run {
             process: std::process::id(),
             state: Mutex::new(State {
                 told: run.asked().parameters.clone(),
+                dimensions: HashMap::new(),
                 stage: Stage::UnderWay(Box::new(run)),
             }),
         })
@@ -223,28 +234,37 @@ impl Run {
         channels: &Bound<'py, PyAny>,
     ) -> PyResult<Option<Asked<'py>>> {
         let mut state = self.hold()?;
-        let State { stage, told } = &mut *state;
+        let State { stage, told, dimensions } = &mut *state;
         let run = stage.run()?;
-        let mut lender = Lender::default();
-        let given = lender.channels(channels);
-        let dimensions = given.as_ref().map_or_else(|_| Vec::new(), Channels::dimensions);
-        // A motion along the third axis would be lost.
-        let flat = dimensions.iter().filter(|(_, dimension)| *dimension == 2);
-        flat.for_each(|(channel, _)| run.keep_in_plane(channel));
         // Refused with what else is wrong on one rank: the others would wait for it.
         let step = step(cycle, time, time_step);
         let cycle = step.as_ref().map_or(0, |step| step.cycle);
-        let is_step = step.is_ok();
-        let given = step.and_then(|step| {
-            let looked_at = run.looks_at(&step);
-            given.map(|channels| Shown { step, looked_at, channels: channels.0 })
-        });
-        let call = Call { run, given };
-        let exception = |error: RunError| {
-            if is_step { of_run(error) } else { StepError::new_err(error.to_string()) }
+        let looked_at = step.as_ref().is_ok_and(|step| run.looks_at(step));
+        // A call with nothing due costs the same, however many fields and features there are.
+        let mut lender = Lender::default();
+        let given = lender.channels(channels, &|channel| looked_at || run.needs_whole(channel));
+        for (channel, dimension) in given.iter().flat_map(Channels::dimensions) {
+            if dimensions.get(channel) != Some(&dimension) {
+                dimensions.insert(channel.to_owned(), dimension);
+                // A motion along the third axis would be lost.
+                if dimension == 2 {
+                    run.keep_in_plane(channel);
+                }
+            }
+        }
+        let given = step
+            .and_then(|step| given.map(|channels| Shown { step, looked_at, channels: channels.0 }));
+        let (given, interrupted) = match given {
+            Ok(shown) => (Ok(shown), None),
+            Err(Mistake::Given(error)) => (Err(error), None),
+            Err(Mistake::Raised(error)) => (Err(RunError::Left(error.to_string())), Some(error)),
         };
-        let shown = guarded(|| py.detach(|| call.execute()).map_err(exception));
+        let call = Call { run, given };
+        let shown = guarded(|| py.detach(|| call.execute()).map_err(of_run));
         drop(lender);
+        if let Some(error) = interrupted {
+            return Err(error);
+        }
         // Before the step's own error, lest it be raised by a later call.
         if let Some(error) = self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
             if let Err(refused) = shown {
@@ -271,7 +291,7 @@ impl Run {
             None => None,
         };
         let steered = run.steered().0;
-        let dimension = dimensions.iter().find(|(name, _)| name == steered).map_or(3, |of| of.1);
+        let dimension = dimensions.get(steered).copied().unwrap_or(3);
         Ok(Some((motion.map(|motion| Motion::new(motion, dimension)), stop, parameters)))
     }
 
@@ -282,8 +302,7 @@ impl Run {
         time: &Bound<'_, PyAny>,
         time_step: &Bound<'_, PyAny>,
     ) -> PyResult<bool> {
-        let step =
-            step(cycle, time, time_step).map_err(|error| StepError::new_err(error.to_string()))?;
+        let step = step(cycle, time, time_step)?;
         let mut state = self.hold()?;
         Ok(state.stage.run()?.looks_at(&step))
     }
@@ -329,6 +348,16 @@ impl Run {
     #[getter]
     fn ended(&self) -> PyResult<bool> {
         Ok(matches!(self.hold()?.stage, Stage::Ended(_)))
+    }
+
+    /// Tells the other ranks that the solver has failed on this one, which shows no step any more.
+    fn leave(&self, py: Python<'_>, reason: &str) -> PyResult<()> {
+        let mut state = self.hold()?;
+        let run = state.stage.run()?;
+        guarded(|| {
+            py.detach(|| run.leave(reason));
+            Ok(())
+        })
     }
 
     /// Ends the run; gives back its report, one JSON object.

@@ -10,6 +10,7 @@ use tombolo::deform::cancellation::Cancellation;
 use tombolo::deform::edit::Edit;
 use tombolo::deform::features::{FeatureSettings, check_feature_names, misplaced_faces};
 use tombolo::deform::mesh::{self, FeatureSource, Mesh, Vector};
+use tombolo::deform::number::Number;
 use tombolo::deform::quality::{quality, scaled_jacobians};
 use tombolo::deform::shape::{Refused, Request};
 use tombolo::deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
@@ -99,7 +100,20 @@ impl Shaper {
     fn points(&self, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Vector>> {
         let Some(given) = given else { return Ok(self.mesh.points().to_vec()) };
         let mut lender = Lender::default();
-        let points = lender.points(given, "points").map_err(of_run)?;
+        let (points, columns) = lender.points(given, "points")?;
+        if columns != self.dimension {
+            return Err(MeshError::new_err(format!(
+                "points: found {columns} columns, expected {}, as the mesh has",
+                self.dimension
+            )));
+        }
+        let is_finite = |point: &Vector| point.iter().all(|coordinate| coordinate.is_finite());
+        if let Some(row) = points.iter().position(|point| !is_finite(point)) {
+            let [x, y, z] = points.get(row).map_or([f64::NAN; 3], |point| *point).map(Number);
+            return Err(MeshError::new_err(format!(
+                "points: row {row}: found ({x}, {y}, {z}), expected finite coordinates"
+            )));
+        }
         if points.len() != self.mesh.points().len() {
             return Err(MeshError::new_err(format!(
                 "points: found {} rows, expected {}, one for each vertex",
@@ -117,8 +131,8 @@ impl Shaper {
     #[pyo3(signature = (mesh, angle))]
     fn new(py: Python<'_>, mesh: &Bound<'_, PyAny>, angle: Option<f64>) -> PyResult<Self> {
         let mut lender = Lender::default();
-        let channels = lender.channels(mesh).map_err(of_run)?;
-        let dimension = channels.dimensions().first().map_or(3, |(_, dimension)| *dimension);
+        let channels = lender.channels(mesh, &|_| true)?;
+        let dimension = channels.dimensions().next().map_or(3, |(_, dimension)| dimension);
         guarded(|| {
             py.detach(move || {
                 let channels = channels;

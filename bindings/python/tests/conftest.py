@@ -238,6 +238,27 @@ def program(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
+def debian(*arguments, begin=(), folder=None):
+    """What Debian's Python did, whose packages for MPI a virtual environment has not."""
+    paths = [str(Path(tombolo.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    ours = {"PYTHONPATH": ":".join(paths), "OMPI_MCA_rmaps_base_oversubscribe": "1"}
+    cache = {} if folder is None else {"XDG_CACHE_HOME": str(folder)}
+    environment = os.environ | allowed | ours | cache
+    command = [*begin, "/usr/bin/python3", *map(str, arguments)]
+    return subprocess.run(command, check=False, env=environment, capture_output=True, text=True, timeout=150)
+
+
+def on_ranks(ranks, text, *arguments):
+    """What a program over mpi4py did on so many ranks; more than one where this was built with MPI."""
+    if not Path("/usr/bin/python3").exists() or debian("-c", "import mpi4py, numpy").returncode != 0:
+        pytest.skip("there is no mpi4py: scripts/setup --distributed")
+    if ranks > 1 and not tombolo.distributed:
+        pytest.skip("built without MPI")
+    begin = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    return debian("-c", text, *arguments, begin=begin)
+
+
 def features_of_program(file):
     """The features that the program finds in a file: the name of each, its faces and its vertices."""
     done = program("features", "--mesh", file, "--json")

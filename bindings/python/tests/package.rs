@@ -36,6 +36,8 @@ fn the_package_passes_its_tests_and_its_examples_run() {
 #[test]
 fn the_types_hold() {
     passes(&["-m", "mypy"]);
+    // What is said of the library's types is so.
+    passes(&["-m", "mypy.stubtest", "tombolo._native"]);
 }
 
 #[test]

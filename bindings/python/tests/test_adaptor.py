@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import weakref
+from collections import UserDict
 
 import numpy as np
 import pytest
@@ -433,3 +434,47 @@ def test_masked_values_are_refused():
     ):
         with pytest.raises(tombolo.MeshError, match=f"{what}.* masked"):
             _native.lent(given)
+
+
+class Watched(UserDict):
+    """Fields or faces that count how often they are looked at."""
+
+    looks = 0
+
+    def items(self):
+        self.looks += 1
+        return super().items()
+
+
+def test_fields_and_faces_are_lent_where_they_are_looked_at():
+    health = {"name": "health", "every": {"steps": 3}, "stages": [{"statistics": {"field": "p"}}]}
+    points = POINTS.copy()
+    shown = mesh(points, fields={"p": np.zeros(27)})
+    shown.fields, shown.faces = Watched(shown.fields), Watched(shown.faces)
+    looks = []
+    with tombolo.Adaptor({"version": 1, "pipelines": [health]}) as adaptor:
+        for cycle in range(7):
+            adaptor.execute(cycle, 0.1 * cycle, 0.1, {"solid": shown})
+            looks.append((shown.fields.looks, shown.faces.looks))
+    assert looks == [(1, 1)] * 3 + [(2, 2)] * 3 + [(3, 3)]
+    # What is wrong with a field is told once it is looked at.
+    shown.fields["p"] = np.zeros(5)
+    with tombolo.Adaptor({"version": 1, "pipelines": [health | {"every": {"steps": 2}}]}) as adaptor:
+        adaptor.execute(0, 0.0, 0.1, {"solid": mesh(points, fields={"p": np.zeros(27)})})
+        assert not adaptor.looks_at(1, 0.1, 0.1)
+        adaptor.execute(1, 0.1, 0.1, {"solid": shown})
+        with pytest.raises(tombolo.MeshError, match="field 'p': found 5 values"):
+            adaptor.execute(2, 0.2, 0.1, {"solid": shown})
+
+
+@pytest.mark.parametrize("other", [np.ndarray.tolist, lambda array: array.astype(array.dtype.newbyteorder(">"))])
+def test_arrays_that_lie_otherwise_while_nobody_looks_are_the_same_mesh(other):
+    points, tops = POINTS.copy(), []
+    with tombolo.Adaptor({"version": 1}, orders=[{"at": {"cycle": 3}, "order": {"edits": SQUEEZE}}]) as adaptor:
+        for cycle in range(5):
+            lent, cells = (other(points), {"tetra": other(TETS)}) if cycle in (1, 2) else (points, {"tetra": TETS})
+            motion = adaptor.execute(cycle, 0.1 * cycle, 0.1, {"solid": mesh(lent, cells)}).motion
+            if motion is not None:
+                points[:] = motion.coordinates
+            tops.append(points[:, 2].max())
+    assert tops[-1] == pytest.approx(0.8), adaptor.orders

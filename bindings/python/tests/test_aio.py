@@ -1,6 +1,8 @@
 """A run from outside in `async` programs."""
 
 import asyncio
+import os
+import signal
 import threading
 import time
 
@@ -156,3 +158,111 @@ def test_an_order_is_cancelled_and_the_block_closes_the_run(begin):
 
         asyncio.run(work())
         assert not run.connected
+
+
+def test_many_waits_hold_no_threads(run):
+    async def work():
+        waits = [asyncio.create_task(run.aio.wait_for(lambda: False, 1.0)) for _ in range(100)]
+        waits += [asyncio.create_task(run.aio.events("order").__anext__()) for _ in range(100)]
+        begun, threads = time.monotonic(), threading.active_count()
+        await asyncio.sleep(0.1)
+        held = threading.active_count() - threads
+        # Neither a command nor the program's own use of the pool waits for them.
+        await run.aio.set("heating", 4, timeout=30)
+        await asyncio.to_thread(time.monotonic)
+        ended = await asyncio.gather(*waits[:100], return_exceptions=True)
+        seconds = time.monotonic() - begun
+        [wait.cancel() for wait in waits]
+        await asyncio.gather(*waits, return_exceptions=True)
+        return held, seconds, ended
+
+    run.drive()
+    held, seconds, ended = asyncio.run(work())
+    # With a thread for each, six at a time, it took seventeen seconds.
+    assert held <= 0 and seconds < 10, (held, seconds)
+    assert all(isinstance(error, tombolo.WaitError) and "1.0 seconds" in str(error) for error in ended)
+    assert run._reader._tells == []
+
+
+def test_a_loop_that_ends_waits_for_no_thread(solver):
+    relay = Relay(solver.link)
+
+    async def ask(run):
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(run.aio.surface(), 0.2)
+
+    with tombolo.connect(relay.link) as run:
+        run.wait_for(lambda: run.features, 30)
+        relay.swallows = True
+        begun = time.monotonic()
+        asyncio.run(ask(run))
+        assert time.monotonic() - begun < 3
+        relay.swallows = False
+        relay.cut()
+    relay.server.close()
+
+
+def displacements(tmp_path):
+    """An order whose displacements are in a file that somebody is about to write."""
+    file = tmp_path / "lift.txt"
+    os.mkfifo(file)
+    return file, [{"displacement": {"file": str(file)}}]
+
+
+def write(file):
+    """Once somebody reads it."""
+    file.write_text("x, y, z, dx, dy, dz\n0, 0, 1, 0, 0, 0.01\n")
+
+
+def nothing_is_given(run):
+    cycle = run.status.cycle
+    run.wait_for_cycle(cycle + 50, 30)
+    return run.orders == []
+
+
+def test_an_order_that_is_cancelled_while_its_file_is_read_is_not_given(run, tmp_path):
+    run.wait_for(lambda: run.features, 30)
+    run.drive()
+    file, edits = displacements(tmp_path)
+
+    async def give():
+        with pytest.raises(asyncio.TimeoutError):
+            await asyncio.wait_for(run.aio.order(edits), 0.3)
+        await asyncio.to_thread(write, file)
+
+    asyncio.run(give())
+    assert nothing_is_given(run)
+
+
+def test_an_order_that_is_interrupted_while_its_file_is_read_is_not_given(run, tmp_path):
+    run.wait_for(lambda: run.features, 30)
+    run.drive()
+    file, edits = displacements(tmp_path)
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.3)
+        with pytest.raises(KeyboardInterrupt):
+            run.order(edits)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    write(file)
+    assert nothing_is_given(run)
+
+
+def test_a_run_is_connected_in_async(solver):
+    async def work():
+        async with tombolo.aio.connect(solver.link) as aio:
+            assert (await aio.wait_for_cycle(1, 30)).cycle >= 1
+        assert not aio.run.connected
+        aio = await tombolo.aio.connect(solver.adaptor.watching_link, watch=True)
+        assert not aio.run.drives
+        await aio.close()
+        with pytest.raises(tombolo.LinkError, match="refused"):
+            await tombolo.aio.connect("http://127.0.0.1:1/?token=abc")
+
+    asyncio.run(work())

@@ -71,6 +71,7 @@ def test_the_examples_are_found():
         "run.order",
         "_watched.wait_for",
         "aio.AsyncRun",
+        "aio.connect",
         "jupyter.Plot",
     }
 
@@ -101,5 +102,6 @@ def test_an_example_runs(example, begin, monkeypatch):
             # Whoever connects first has the wheel.
             run.close()
         exec(compile(example.replace(LINK, running.link), "example", "exec"), names)
-        if "squeeze" in names:
-            asyncio.run(asyncio.wait_for(names["squeeze"](run), 60))
+        for name, given in (("squeeze", [run]), ("watch", [])):
+            if name in names:
+                asyncio.run(asyncio.wait_for(names[name](*given), 60))

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tombolo
-from conftest import EXAMPLES, FLOW, load, study
+from conftest import EXAMPLES, FLOW, debian, load, study
 from tombolo import _native
 
 
@@ -230,23 +229,13 @@ if ranks.rank == 0:
 
 
 def test_heat_with_dolfinx_on_ranks(tmp_path):
-    # It is Debian's, and so is its Python.
-    paths = [str(Path(tombolo.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
-    allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    ours = {"PYTHONPATH": ":".join(paths), "OMPI_MCA_rmaps_base_oversubscribe": "1", "XDG_CACHE_HOME": str(tmp_path)}
-    environment = os.environ | allowed | ours
-
-    def python(*arguments, begin=()):
-        command = [*begin, "/usr/bin/python3", *arguments]
-        return subprocess.run(command, check=False, env=environment, capture_output=True, text=True, timeout=150)
-
-    if not Path("/usr/bin/python3").exists() or python("-c", "import dolfinx").returncode != 0:
+    if not Path("/usr/bin/python3").exists() or debian("-c", "import dolfinx").returncode != 0:
         pytest.skip("there is no dolfinx: scripts/setup --distributed")
     squeeze = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}
     orders = json.dumps(commands(squeeze, {"steps": 5, "every": {"steps": 2}}, 30, 70))
     ranks = 3 if _native.DISTRIBUTED else 1
     begin = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    said = python("-c", DOLFINX, EXAMPLES / "heat/python", orders, tmp_path, begin=begin)
+    said = debian("-c", DOLFINX, EXAMPLES / "heat/python", orders, tmp_path, begin=begin, folder=tmp_path)
     assert said.returncode == 0, said.stdout + said.stderr
     told = json.loads(next(line for line in said.stdout.splitlines() if line.startswith("told"))[5:])
     assert told["ranks"] == ranks

@@ -388,3 +388,18 @@ def test_a_command_is_done_once_the_solver_has_it(begin):
         command = run.set("heating", 7, timeout=60)
         assert command.cycle is not None
         wait(lambda: 7 in running.heating)
+
+
+def test_a_run_that_does_not_answer_is_waited_for_as_long_as_the_caller_says(solver):
+    relay = Relay(solver.link)
+    with tombolo.connect(relay.link, timeout=0.5) as run:
+        run.wait_for(lambda: run.features, 30)
+        relay.swallows = True
+        for ask in (lambda: run.stack, lambda: run.surface, lambda: run.pipelines, lambda: run.link_for(timeout=0.5)):
+            begun = time.monotonic()
+            with pytest.raises(tombolo.WaitError, match=r"no answer within 0\.5 seconds"):
+                ask()
+            assert time.monotonic() - begun < 15
+        with pytest.raises(tombolo.WaitError, match=r"no answer within 0\.5 seconds"):
+            tombolo.connect(relay.link, timeout=0.5)
+    relay.server.close()

@@ -137,7 +137,7 @@ def test_physical_surfaces_of_gmsh_are_features_by_name(version, tmp_path):
     mesh.field_data = {}
     assert [name for name, *_ in features_of(mesh)] == [f"feature-{number}" for number in range(1, 6)]
     assert len(tombolo.Shaper(mesh).scaled_jacobians()) == sum(len(it.data) for it in mesh.cells if it.type == "tetra")
-    mesh.cell_data = {}
+    mesh.cell_data = mesh.cell_sets = {}
     assert features_of(mesh) == features_of(meshio.Mesh(mesh.points, [("tetra", mesh.get_cells_type("tetra"))]))
 
 
@@ -305,3 +305,26 @@ def test_work_of_each_kind_is_given_up(work):
         calls[work](None)
     shaper._shaper = native
     assert calls[work](None) is not None
+
+
+def test_features_are_named_under_either_name():
+    named = {"faces": FACES}, {"features": FACES}
+    of_faces, of_features = (tombolo.Shaper(POINTS, {"tetra": TETS}, **given) for given in named)
+    assert of_faces.features == of_features.features == shaper_of().features
+    with pytest.raises(tombolo.MeshError, match="found faces beside them"):
+        tombolo.Shaper(POINTS, {"tetra": TETS}, FACES, features=FACES)
+
+
+def test_named_sets_of_faces_are_features(tmp_path):
+    blocks = [("triangle", FACES["top"]), ("tetra", TETS), ("triangle", FACES["bottom"])]
+    counts = [len(rows) for _, rows in blocks]
+    nothing = np.array([], int)
+    sets = {
+        "top": [np.arange(counts[0]), nothing, nothing],
+        "bottom": [nothing, nothing, np.arange(counts[2])],
+        "steel": [nothing, np.arange(counts[1]), nothing],
+    }
+    mesh = meshio.Mesh(POINTS, blocks, cell_sets=sets)
+    assert features_of(mesh) == [(it["name"], it["faces"], it["vertices"]) for it in shaper_of().features]
+    mesh.write(tmp_path / "box.inp")
+    assert {it["name"] for it in tombolo.Shaper(meshio.read(tmp_path / "box.inp")).features} >= {"top", "bottom"}

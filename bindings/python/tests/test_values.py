@@ -1,11 +1,13 @@
 """What cannot be meant is told where it was given: what was found, and what is expected."""
 
 import asyncio
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 import tombolo
 from conftest import SQUEEZE, box
+from tombolo import _native
 
 POINTS, TETS = box(1)
 
@@ -49,6 +51,31 @@ def test_settings_of_an_adaptor():
         assert text in str(error.value)
 
 
+def test_numbers_that_json_cannot_hold_have_their_place(run):
+    values = np.zeros((2, 3))
+    values[1, 2] = np.nan
+    edits = [{"translate": {}}, {"displacement": {"vertices": [0, 1], "values": values}}]
+    with pytest.raises(tombolo.ConfigurationError) as error:
+        run.order(edits)
+    assert str(error.value) == "order: [1].displacement.values[1][2]: found nan, expected a finite number"
+    with pytest.raises(tombolo.ConfigurationError, match=r"configuration: a\.b\[0\]: found inf, expected a finite"):
+        tombolo.Adaptor({"a": {"b": (np.inf,)}})
+    ring = []
+    ring.append(ring)
+    with pytest.raises(tombolo.ConfigurationError, match="expected what JSON can hold"):
+        run.order(ring)
+
+
+def test_what_is_no_communicator():
+    class Null:
+        def Get_size(self):
+            raise Exception("MPI_ERR_COMM: invalid communicator")
+
+    for given in (3, Null()):
+        with pytest.raises(tombolo.ConfigurationError, match=r"the communicator: found .*expected one of mpi4py"):
+            tombolo.Adaptor(communicator=given)
+
+
 def test_what_is_no_mesh_for_a_shaper():
     mesh = tombolo.Mesh(POINTS, {"tetra": TETS})
     for given, text in (
@@ -70,3 +97,93 @@ def test_a_shaper_has_no_orders_that_could_be_replaced():
     for ask in (shaper.shape, shaper.forecast):
         with pytest.raises(TypeError, match="replaces"):
             ask(SQUEEZE, replaces="o1")
+
+
+def test_one_edit_by_itself_is_no_order(run):
+    shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
+    for given, found in (
+        ({"translate": {"features": ["top"], "by": [0, 0, 1]}}, "an object with the key `translate` alone"),
+        ({}, "an object without a key"),
+        (None, "null"),
+        ({"version": 1, "pipelnes": []}, "an object with the keys `pipelnes`, `version`"),
+    ):
+        for ask in (run.order, shaper.shape):
+            with pytest.raises(tombolo.ConfigurationError) as error:
+                ask(given)
+            assert f"order: found {found}, expected an order of a new shape" in str(error.value)
+    with pytest.raises(tombolo.ConfigurationError, match="did you mean `edits`"):
+        run.order({"edit": []})
+
+
+def test_points_that_are_measured_are_those_of_the_mesh():
+    shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
+    wrong = POINTS.copy()
+    wrong[3, 1] = np.nan
+    for given, text in (
+        (wrong, r"points: row 3: found \(0, NaN, 1\), expected finite coordinates"),
+        (POINTS[:, :2], "points: found 2 columns, expected 3, as the mesh has"),
+        (POINTS[:4], "points: found 4 rows, expected 8"),
+    ):
+        for measure in (shaper.quality, shaper.scaled_jacobians):
+            with pytest.raises(tombolo.MeshError, match=text):
+                measure(given)
+
+
+def cells_told(cells, points=POINTS):
+    with tombolo.Adaptor() as adaptor, pytest.raises(tombolo.MeshError) as error:
+        adaptor.execute(0, 0.0, 0.1, {"solid": {"points": points, "cells": cells}})
+    return str(error.value)
+
+
+def test_cells_that_cannot_be_are_told_in_plain_words():
+    for kind in ("tetra10", "triangle6", "hexahedron27", 24, np.uint8(22)):
+        assert "expected linear cells: of PyVista's, mesh.linear_copy()" in cells_told({kind: np.zeros((1, 10), int)})
+    assert "did you mean 'tetra'" in cells_told({"tetar": TETS})
+    vtk = {"connectivity": TETS.ravel(), "offsets": np.arange(0, 25, 4), "types": np.full(6, 10)}
+    assert "found 'ofsets' beside 'connectivity'" in cells_told({**vtk, "ofsets": 3})
+    assert cells_told({**vtk, "connectivity": TETS.ravel() + 1}).startswith(
+        "channel 'solid', cells, connectivity: cell 0"
+    )
+
+
+def test_meshes_are_any_mappings_and_a_channel_may_be_called_points():
+    mesh = MappingProxyType({"points": POINTS, "cells": MappingProxyType({"tetra": TETS})})
+    plain = tombolo.Mesh(POINTS, {"tetra": TETS})
+    for given in (mesh, {"points": mesh}, {"points": plain}, MappingProxyType({"solid": mesh})):
+        lent = _native.lent(given)
+        assert [name for name, *_ in lent] == ["points"] * 3 + ["cells"]
+    with pytest.raises(tombolo.MeshError, match="did you mean 'cells'"):
+        _native.lent({"solid": MappingProxyType({"points": POINTS, "cell": {}})})
+
+
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, MemoryError, SystemExit])
+def test_what_interrupts_the_reading_of_a_mesh_is_raised_as_it_is(kind):
+    class Interrupted:
+        def __array__(self, *_, **__):
+            raise kind("enough")
+
+        def __index__(self):
+            raise kind("enough")
+
+        @property
+        def points(self):
+            raise kind("enough")
+
+    with tombolo.Adaptor() as adaptor:
+        for given in (tombolo.Mesh(Interrupted()), tombolo.Mesh(POINTS, {"tetra": Interrupted()}), Interrupted()):
+            with pytest.raises(kind, match="enough"):
+                adaptor.execute(0, 0.0, 0.1, given)
+        with pytest.raises(kind, match="enough"):
+            adaptor.execute(Interrupted(), 0.0, 0.1, tombolo.Mesh(POINTS))
+        # It may be called again.
+        adaptor.execute(0, 0.0, 0.1, tombolo.Mesh(POINTS))
+
+
+def test_an_error_of_a_property_is_told():
+    class Odd:
+        @property
+        def points(self):
+            raise RuntimeError("not on this device")
+
+    with tombolo.Adaptor() as adaptor, pytest.raises(tombolo.MeshError, match="not on this device"):
+        adaptor.execute(0, 0.0, 0.1, {"solid": Odd()})

@@ -1,8 +1,12 @@
 """What is known of a run at once, what is not there yet, and what is not there at all."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 import tombolo
+from conftest import box, ends, features_of
 
 
 def test_what_is_announced_is_there_at_once(begin):
@@ -65,3 +69,25 @@ def test_a_view_does_not_change_any_more(run):
     mesh.point_data["temperature"][:] = 0
     mesh.cell_data["material"][0][:] = 0
     assert later.points.any() and later.fields["temperature"].any()
+
+
+def test_a_surface_for_meshio_has_its_features():
+    pytest.importorskip("meshio")
+    points, tets = box(2)
+    shaper = tombolo.Shaper(points, {"tetra": tets}, ends(points, tets))
+    surface = shaper.surface.to_meshio()
+    assert np.array_equal(
+        surface.points[surface.cells_dict["triangle"]], points[shaper.surface.vertices][surface.cells_dict["triangle"]]
+    )
+    assert features_of(surface) == [(it["name"], it["faces"], it["vertices"]) for it in shaper.features]
+
+
+def test_tables_are_copied_with_the_rows_that_there_are():
+    table = tombolo.MonitorTable("health")
+    for cycle in range(100):
+        table._append({"cycle": cycle, "time": 0.1 * cycle, "values": {"drag": cycle}})
+    for other in (pickle.loads(pickle.dumps(table)), copy.deepcopy(table)):
+        table._append({"cycle": 200, "time": 20, "values": {"drag": 0}})
+        assert other.pipeline == "health" and np.array_equal(other["drag"], np.arange(100))
+        other._append({"cycle": 100, "time": 10, "values": {"drag": 100, "lift": 1}})
+        assert other.last == {"cycle": 100, "time": 10, "drag": 100, "lift": 1} and other.rows == 101

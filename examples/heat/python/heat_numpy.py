@@ -6,11 +6,8 @@ python examples/heat/python/heat_numpy.py                # opens a server: follo
 import numpy as np
 import tombolo
 
-PIPELINES = {
-    "version": 1,
-    "stream": {"listen": "127.0.0.1:0"},
-    "pipelines": [{"name": "surface", "every": {"steps": 10}, "stages": [{"surface": {}}, {"stream": {}}]}],
-}
+SURFACE = {"name": "surface", "every": {"steps": 10}, "stages": [{"surface": {}}, {"stream": {}}]}
+PIPELINES = {"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [SURFACE]}
 CUBE = [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]]
 
 
@@ -34,7 +31,7 @@ def geometry(points, tets):
     return np.linalg.det(edges) / 6, np.concatenate([-inverse.sum(1, keepdims=True), inverse], 1)
 
 
-def run(steps, count=6, time_step=1e-3, orders=None, seen=None, output=None):
+def run(steps, count=6, time_step=1e-3, orders=None, seen=lambda *_: None, output=None):
     """Takes the steps, and calls `seen(cycle, points, flux)` behind each; returns the report."""
     points, tets, faces = box(count)
     temperature = np.zeros(len(points))
@@ -52,6 +49,7 @@ def run(steps, count=6, time_step=1e-3, orders=None, seen=None, output=None):
             if steering.motion is not None:
                 points[:], velocity = steering.motion.coordinates, steering.motion.velocity
             volumes, gradients = geometry(points, tets)
+            mass = np.bincount(tets.ravel(), np.repeat(volumes / 4, 4), len(points))
             conductivity = steering.parameters["conductivity"]
             # Explicit steps are stable up to a length that the smallest tetrahedron sets.
             parts = 1 + int(2 * conductivity * time_step * (gradients**2).sum((1, 2)).max())
@@ -60,15 +58,11 @@ def run(steps, count=6, time_step=1e-3, orders=None, seen=None, output=None):
                 conducted = np.einsum("t,tj,tij->ti", conductivity * volumes, slope, gradients)
                 # Vertices that move carry their values along: the ALE term.
                 carried = np.einsum("t,tij,tj->ti", volumes / 4, velocity[tets], slope)
-                rate, mass = (
-                    np.bincount(tets.ravel(), part.ravel(), len(points))
-                    for part in (carried - conducted, np.repeat(volumes / 4, 4))
-                )
+                rate = np.bincount(tets.ravel(), (carried - conducted).ravel(), len(points))
                 flux = rate[np.unique(faces["bottom"])].sum()
                 rate[held] = 0
                 temperature += time_step / parts * rate / mass
-            if seen is not None:
-                seen(cycle, points, flux)
+            seen(cycle, points, flux)
     return adaptor.report
 
 

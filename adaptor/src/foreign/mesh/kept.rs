@@ -83,19 +83,13 @@ impl Kept {
         channel: &Channel<'_>,
         looked_at: bool,
     ) -> Result<bool, RunError> {
-        let counts = (
-            channel.vertex_count(),
-            channel.blocks.iter().map(|block| block.domain.topology.cell_count()).sum(),
-        );
+        if !looked_at && self.suffices(channel) {
+            return Ok(false);
+        }
+        let counts = counts(channel);
         let single = channel.single();
         let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
-        let has_cells = lent_cells.is_some() || self.cells.is_some();
-        let has_points = lent_points || self.points.len() == counts.0;
-        let is_whole = self.fingerprint.is_some() && has_cells && has_points;
-        if !looked_at && is_whole && counts == self.counts {
-            return Ok(false);
-        }
         channel.check_memory()?;
         let fingerprint = channel.fingerprint();
         let is_same = self.fingerprint == Some(fingerprint);
@@ -141,6 +135,17 @@ impl Kept {
         }
         self.copy_fields(channel);
         Ok(is_other)
+    }
+
+    /// Whether what is kept and what can be lent are the whole mesh, where nobody looks at values.
+    pub(crate) fn suffices(&self, channel: &Channel<'_>) -> bool {
+        let counts = counts(channel);
+        let single = channel.single();
+        let has_cells =
+            self.cells.is_some() || single.is_some_and(|domain| domain.topology.lent().is_some());
+        let has_points = self.points.len() == counts.0
+            || single.is_some_and(|domain| domain.coordset.lent().is_some());
+        self.fingerprint.is_some() && has_cells && has_points && counts == self.counts
     }
 
     /// Takes what is kept for what passed: the adaptor has refused none of it.
@@ -266,8 +271,14 @@ impl Channel<'_> {
         let mut kept = Kept::default();
         kept.update(self, true)?;
         let mesh = kept.views(self, &mut Vec::new()).to_mesh();
-        mesh.map_err(|source| RunError::Cells { path: self.label.to_string(), source })
+        mesh.map_err(|source| RunError::Cells { place: self.label.place(), source })
     }
+}
+
+/// How many vertices and cells it has.
+fn counts(channel: &Channel<'_>) -> (usize, usize) {
+    let cells = channel.blocks.iter().map(|block| block.domain.topology.cell_count()).sum();
+    (channel.vertex_count(), cells)
 }
 
 fn address(domain: &Domain<'_>) -> usize {

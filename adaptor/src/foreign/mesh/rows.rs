@@ -210,5 +210,5 @@ pub(super) fn vertex(
 
 fn no_such_vertex(label: &Label, cell: usize, vertex: u64, vertices: usize) -> RunError {
     let source = MeshError::VertexNumber { cell, vertex, vertex_count: vertices };
-    RunError::Cells { path: label.to_string(), source }
+    RunError::Cells { place: label.place(), source }
 }

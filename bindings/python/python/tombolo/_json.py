@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, Optional, Union
 
 import numpy as np
 
@@ -31,7 +32,37 @@ def text(value: object, name: str) -> str:
     try:
         return json.dumps(value, default=_plain, allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
-        raise ConfigurationError(f"{name}: {error}; expected what JSON can hold") from None
+        place = _not_finite(value)
+        wrong = f"{error}; expected what JSON can hold" if place is None else f"{place}, expected a finite number"
+        raise ConfigurationError(f"{name}: {wrong}") from None
+
+
+def _not_finite(value: object) -> Optional[str]:
+    """Where a value has a number that JSON cannot hold."""
+
+    def places(value: object, path: str) -> Iterator[str]:
+        if isinstance(value, (np.ndarray, np.generic)):
+            value = value.tolist()
+        if isinstance(value, Mapping):
+            for key, one in value.items():
+                yield from places(one, f"{path}.{key}" if path else str(key))
+        elif isinstance(value, (list, tuple)):
+            for index, one in enumerate(value):
+                yield from places(one, f"{path}[{index}]")
+        elif isinstance(value, float) and not math.isfinite(value):
+            yield f"{path}: found {value}"
+
+    try:
+        return next(places(value, ""), None)
+    except RecursionError:
+        return None
+
+
+def file(value: object, name: str) -> str:
+    """The name of a file or a directory as a text."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise ConfigurationError(f"{name}: found {value!r}, expected the name of a file")
+    return str(os.fspath(value))
 
 
 def source(value: object, name: str) -> Source:

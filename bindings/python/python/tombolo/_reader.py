@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import threading
 import time as clock
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Optional, TypeVar
 
 from . import _json, _native
-from ._waiting import moment_after
+from ._waiting import Parts, Result, moment_after
 from .errors import CallError, EndedError, FailedError, TomboloError, WaitError
 from .events import Event
 from .state import State
@@ -25,6 +26,11 @@ _SLICE = 0.2
 _EVENTS = 4096
 
 _READERS: weakref.WeakSet[Reader] = weakref.WeakSet()
+
+
+def late(timeout: Optional[float]) -> WaitError:
+    """Say that what was waited for did not come in time."""
+    return WaitError(f"it did not come within {timeout} seconds")
 
 
 class Reader:
@@ -56,6 +62,7 @@ class Reader:
         self._missed = 0
         self._process = os.getpid()
         self._listeners: list[weakref.ref[deque[Event]]] = []
+        self._tells: list[Callable[[], None]] = []
         self._thread = threading.Thread(target=self._read, args=(client,), name="tombolo-run", daemon=True)
         _READERS.add(self)
         self._thread.start()
@@ -72,7 +79,7 @@ class Reader:
             with self.changed:
                 self.failure = failure
                 self._tell(Event("ended", str(failure)))
-                self.changed.notify_all()
+                self._wake()
         if self.closed:
             self._let_go()
 
@@ -80,7 +87,7 @@ class Reader:
         data = _json.loads(payload) if isinstance(payload, str) and kind != "lost" else payload
         with self.changed:
             self._tell(self._state.take(kind, data))
-            self.changed.notify_all()
+            self._wake()
 
     def _tell(self, event: Event) -> None:
         self._listeners = [listener for listener in self._listeners if listener() is not None]
@@ -88,6 +95,12 @@ class Reader:
             waiting = listener()
             if waiting is not None:
                 waiting.append(event)
+
+    def _wake(self) -> None:
+        """Have whoever waits look again. `changed` is held."""
+        self.changed.notify_all()
+        for tell in tuple(self._tells):
+            tell()
 
     # ---- The client.
 
@@ -131,7 +144,7 @@ class Reader:
             return
         with self.changed:
             self.closed = True
-            self.changed.notify_all()
+            self._wake()
         if threading.current_thread() is not self._thread:
             self._thread.join(5.0)
         self._let_go()
@@ -146,7 +159,7 @@ class Reader:
     def _let_go(self) -> None:
         with self.changed:
             client, self._missed, self._client = self._client, self.missed, None
-            self.changed.notify_all()
+            self._wake()
         if client is not None:
             # Letting go of it would not do: the traceback of an error may hold it, and the wheel with it.
             client.close()
@@ -158,17 +171,49 @@ class Reader:
         until = moment_after(timeout)
         with self.changed:
             while True:
-                self.check()
-                answer = found()
+                answer = self.look(found)
                 if answer:
                     return answer
-                if self.failure is not None:
-                    raise self._over(self.failure)
                 left = until - clock.monotonic()
                 if left <= 0:
-                    raise WaitError(f"it did not come within {timeout} seconds")
+                    raise late(timeout)
                 # Short enough for Ctrl-C on every system.
                 self.changed.wait(min(left, 1.0))
+
+    def look(self, found: Callable[[], Found]) -> Found:
+        """What `found` returns now; an error where it is nothing true and nothing comes any more."""
+        with self.changed:
+            self.check()
+            answer = found()
+            if not answer and self.failure is not None:
+                raise self._over(self.failure)
+            return answer
+
+    @contextlib.contextmanager
+    def telling(self, tell: Callable[[], None]) -> Iterator[None]:
+        """Have a function called whenever there may be something new, by any thread; it must not wait."""
+        with self.changed:
+            self._tells.append(tell)
+        try:
+            yield
+        finally:
+            with self.changed:
+                self._tells.remove(tell)
+
+    def carry_out(self, parts: Parts[Result]) -> Result:
+        """Carry out a wait in parts."""
+        try:
+            wanted = next(parts)
+            while True:
+                try:
+                    answer = self.wait_for(*wanted)
+                except Exception as error:
+                    wanted = parts.throw(error)
+                else:
+                    wanted = parts.send(answer)
+        except StopIteration as end:
+            result: Result = end.value
+            return result
 
     def _over(self, failure: TomboloError) -> TomboloError:
         end = self._state.end

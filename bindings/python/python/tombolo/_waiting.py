@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
-from typing import Optional, TypeVar
+from collections.abc import Callable, Generator
+from typing import Any, Optional, TypeVar
 
 Result = TypeVar("Result")
+
+#: What is waited for, and how many seconds at most.
+Wanted = tuple[Callable[[], object], Optional[float]]
+#: A wait in parts, carried out by a thread (`Reader.carry_out`) or by a loop (`aio`): it yields what it wants, is given
+#: that or why it does not come, and returns what comes of it.
+Parts = Generator[Wanted, Any, Result]
 
 
 def moment_after(timeout: Optional[float]) -> float:

@@ -11,7 +11,7 @@ from typing import Any, Optional, TypeVar
 from . import _json, _native
 from ._names import unknown
 from ._reader import Reader
-from ._waiting import in_thread
+from ._waiting import Parts, in_thread
 from .errors import EndedError, WaitError
 from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
@@ -27,11 +27,12 @@ _ANNOUNCED = 2.0
 class Watched:
     """What a client does that only watches; a `Run` steers too."""
 
-    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int) -> None:
+    def __init__(self, link: str, *, watch: bool, views: bool, attempts: int, timeout: Optional[float]) -> None:
         self.link = link
         self._watch = watch
         self._state = State()
-        self._reader = Reader(in_thread(lambda: _native.Client(link, views, watch, attempts)), self._state)
+        client = in_thread(lambda: _native.Client(link, views, watch, attempts, timeout))
+        self._reader = Reader(client, self._state)
         self._callbacks = Callbacks(self._reader)
         # The thread that reads holds the reader: without this a run that nobody has any more would keep the wheel.
         weakref.finalize(self, self._reader.abandon).atexit = False
@@ -90,7 +91,13 @@ class Watched:
 
     @property
     def stack(self) -> list[dict[str, Any]]:
-        """The edits that make the present shape, the oldest first, as the run answers now."""
+        """The edits that make the present shape, the oldest first, as the run answers now.
+
+        Raises
+        ------
+        WaitError
+            It does not answer in time: see `connect`.
+        """
         edits: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.stack))
         return edits
 
@@ -127,12 +134,20 @@ class Watched:
         ------
         LinkError
             Where there is no mesh whose shape could be changed, or not yet.
+        WaitError
+            The run does not answer in time: see `connect`.
         """
         return Surface(**in_thread(self._reader.client.surface))
 
     @property
     def pipelines(self) -> list[dict[str, Any]]:
-        """The pipelines as they are now."""
+        """The pipelines as they are now.
+
+        Raises
+        ------
+        WaitError
+            The run does not answer in time: see `connect`.
+        """
         pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.pipelines))
         return pipelines
 
@@ -171,40 +186,40 @@ class Watched:
 
     def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status."""
+        return self._reader.carry_out(self._wait_for_cycle(cycle, timeout))
 
+    def _wait_for_cycle(self, cycle: int, timeout: Optional[float]) -> Parts[Status]:
         def found() -> Optional[Status]:
             return self._state.status if self._state.status is not None and self._state.status.cycle >= cycle else None
 
-        status = self.wait_for(found, timeout)
-        assert status is not None
+        status: Status = yield found, timeout
         return status
 
     def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
         """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
+        return self._reader.carry_out(self._wait_for_view(name, after, timeout))
 
+    def _wait_for_view(self, name: str, after: Optional[int], timeout: Optional[float]) -> Parts[View]:
         def found() -> Optional[View]:
             view = self._state.views.get(name)
             return view if view is not None and (after is None or view.cycle > after) else None
 
-        self._announced(name, timeout)
-        view = self.wait_for(found, timeout)
-        assert view is not None
+        if self.view_names and name not in self.view_names:
+            # A view that was added a moment ago is announced a moment later.
+            try:
+                yield (lambda: name in self.view_names), _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout)
+            except WaitError:
+                raise KeyError(unknown("view", name, self.view_names)) from None
+        view: View = yield found, timeout
         return view
-
-    def _announced(self, name: str, timeout: Optional[float] = None) -> None:
-        """An error where there is no view of a name, nor comes to be one."""
-        if not self.view_names or name in self.view_names:
-            return
-        # A view that was added a moment ago is announced a moment later.
-        try:
-            self.wait_for(lambda: name in self.view_names, _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout))
-        except WaitError:
-            raise KeyError(unknown("view", name, self.view_names)) from None
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how."""
+        return self._reader.carry_out(self._wait_for_end(timeout))
+
+    def _wait_for_end(self, timeout: Optional[float]) -> Parts[dict[str, Any]]:
         try:
-            end = self.wait_for(lambda: self._state.end, timeout)
+            end = yield (lambda: self._state.end), timeout
         except EndedError:
             end = self._state.end
         return end or {"how": "unknown"}

@@ -22,6 +22,15 @@ Document = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Any]]
 Range = tuple[float, float, float]
 Condition = Literal["inflow", "outflow", "wall"]
 Given = TypeVar("Given")
+# The settings of a run, as the library takes them.
+_Given = tuple[
+    Optional[_json.Source],
+    Optional[_json.Source],
+    Optional[str],
+    list[tuple[str, float, float, float]],
+    list[tuple[str, str]],
+    Optional[str],
+]
 
 _CONDITIONS = "'inflow', 'outflow' or 'wall'"
 
@@ -152,6 +161,25 @@ class Steering(NamedTuple):
     parameters: Mapping[str, float]
 
 
+def _handle(communicator: Any) -> Optional[int]:
+    """The handle by which the library knows a communicator; None where this process is all of it."""
+    try:
+        size, handle = communicator.Get_size(), communicator.py2f()
+    except Exception as error:
+        # Of the null communicator and of one that was freed mpi4py raises what is no error of Python's own.
+        raise ConfigurationError(
+            f"the communicator: found {communicator!r} ({error}), expected one of mpi4py that this process is in"
+        ) from None
+    if _native.DISTRIBUTED:
+        return int(handle)
+    if size > 1:
+        raise ConfigurationError(
+            f"the communicator: found {size} ranks, and this package was built without MPI; "
+            "expected one that was built with the feature 'distributed'"
+        )
+    return None
+
+
 def _ranges(parameters: Optional[Mapping[str, Range]]) -> list[tuple[str, float, float, float]]:
     ranges = []
     for name, given in _named(parameters, "parameters", "(value, minimum, maximum)"):
@@ -211,6 +239,13 @@ class Adaptor:
     FailedError
         An address is in use, or a file cannot be written.
 
+    Notes
+    -----
+    On several ranks what is wrong on one is an error on all of them, of the same class. An exception that ends the
+    `with` block on one rank ends the run on the others too: their next `execute` raises `FailedError`. Where they wait
+    for that rank in messages of their own, ``python -m mpi4py solver.py`` ends them. `orders` and the orders of
+    `report` are told on rank 0 alone.
+
     Examples
     --------
     A solver of ten steps. An order squeezes its box at cycle 2, another restores it at cycle 6:
@@ -248,25 +283,25 @@ class Adaptor:
         output: Optional[Union[str, os.PathLike[str]]] = None,
         communicator: Any = None,
     ) -> None:
-        handle = None
-        if communicator is not None:
-            size = communicator.Get_size()
-            if _native.DISTRIBUTED:
-                handle = communicator.py2f()
-            elif size > 1:
-                raise ConfigurationError(
-                    f"the communicator: found {size} ranks, and this package was built without MPI; "
-                    "expected one that was built with the feature 'distributed'"
-                )
-        self._run: _native.Run = _native.Run(
-            None if configuration is None else _json.source(configuration, "configuration"),
-            None if orders is None else _json.source(orders, "orders"),
-            None if replay is None else os.fspath(replay),
-            _ranges(parameters),
-            [(name, str(condition)) for name, condition in _named(conditions, "conditions", _CONDITIONS)],
-            None if output is None else os.fspath(output),
-            handle,
-        )
+        handle = None if communicator is None else _handle(communicator)
+        mistake: Optional[Exception] = None
+        given: _Given = (None, None, None, [], [], None)
+        try:
+            given = (
+                None if configuration is None else _json.source(configuration, "configuration"),
+                None if orders is None else _json.source(orders, "orders"),
+                None if replay is None else _json.file(replay, "replay"),
+                _ranges(parameters),
+                [(name, str(condition)) for name, condition in _named(conditions, "conditions", _CONDITIONS)],
+                None if output is None else _json.file(output, "output"),
+            )
+        except Exception as error:
+            mistake = error
+        try:
+            # What is wrong on one rank is told on all: the others would wait for it.
+            self._run: _native.Run = _native.Run(*given, handle, None if mistake is None else str(mistake))
+        except ConfigurationError as error:
+            raise error if mistake is None else mistake from None
         self._still = Steering(None, False, MappingProxyType(dict(self._run.parameters)))
 
     def execute(
@@ -352,7 +387,7 @@ class Adaptor:
 
     @property
     def orders(self) -> list[dict[str, Any]]:
-        """The orders so far, and what became of each."""
+        """The orders so far, and what became of each; on several ranks they are told on rank 0 alone."""
         if self._run.ended:
             return list(self.report["orders"])
         orders: list[dict[str, Any]] = _json.loads(self._run.orders)
@@ -393,6 +428,8 @@ class Adaptor:
             self.finalize()
             return
         try:
+            if not self._run.ended:
+                self._run.leave(f"{type(error).__name__}: {error}")
             self.finalize()
         except Exception as other:
             # The first error says why the run is over.

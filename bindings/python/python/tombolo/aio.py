@@ -3,44 +3,149 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import os
+import threading
 import time as clock
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Generator, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json
+from ._reader import Reader, late
 from ._values import number, whole
-from .errors import CallError, WaitError
+from ._waiting import Parts, Result, moment_after
+from .errors import CallError
 from .events import check_kinds
 from .orders import Command, Edits, Forecast, Order
-from .run import _text
+from .run import Run, _text
+from .run import connect as _connect
 
 if TYPE_CHECKING:
     from . import _native
     from .events import Event
-    from .run import Run
     from .state import Status
     from .views import Surface, View
 
-__all__ = ["AsyncOrder", "AsyncRun"]
+__all__ = ["AsyncOrder", "AsyncRun", "connect"]
 
 Found = TypeVar("Found")
 
-#: How long a thread waits at once, in seconds: so long a task that was cancelled keeps one.
-_SLICE = 0.5
+
+async def _wait_for(reader: Reader, found: Callable[[], Found], timeout: Optional[float]) -> Found:
+    """A wait that holds no thread: the one that reads has the loop look again."""
+    loop, told, until = asyncio.get_running_loop(), asyncio.Event(), moment_after(timeout)
+
+    def tell() -> None:
+        # A loop that was closed has nobody who waits.
+        with contextlib.suppress(RuntimeError):
+            loop.call_soon_threadsafe(told.set)
+
+    with reader.telling(tell):
+        while True:
+            told.clear()
+            answer = reader.look(found)
+            if answer:
+                return answer
+            left = until - clock.monotonic()
+            if left <= 0:
+                raise late(timeout)
+            timer = None if timeout is None else loop.call_later(left, told.set)
+            try:
+                await told.wait()
+            finally:
+                if timer is not None:
+                    timer.cancel()
 
 
-async def _in_slices(wait: Callable[[float], Found], timeout: Optional[float]) -> Found:
-    """A wait in a thread, in pieces, so that none goes on long after its task was cancelled."""
+async def _carry_out(reader: Reader, parts: Parts[Result]) -> Result:
+    """As `Reader.carry_out`, on a loop."""
+    try:
+        found, timeout = next(parts)
+        while True:
+            try:
+                answer = await _wait_for(reader, found, timeout)
+            except Exception as error:
+                found, timeout = parts.throw(error)
+            else:
+                found, timeout = parts.send(answer)
+    except StopIteration as end:
+        result: Result = end.value
+        return result
+
+
+async def _in_thread(call: Callable[[], Result]) -> Result:
+    """What a call returns that blocks.
+
+    It has a thread of its own: asyncio's pool has few, which are the program's, and its end waits for them.
+    """
     loop = asyncio.get_running_loop()
-    until = None if timeout is None else loop.time() + timeout
-    while True:
-        left = _SLICE if until is None else min(_SLICE, max(until - loop.time(), 0.0))
+    done: asyncio.Future[Result] = loop.create_future()
+
+    def settle(settled: Callable[[Any], None], outcome: object) -> None:
+        # Whoever waited may have been cancelled.
+        if not done.done():
+            settled(outcome)
+
+    def work() -> None:
         try:
-            return await asyncio.to_thread(wait, left)
-        except WaitError as error:
-            if until is not None and loop.time() >= until:
-                raise WaitError(f"it did not come within {timeout} seconds") from error
+            settled: tuple[Callable[[Any], None], object] = (done.set_result, call())
+        except BaseException as error:
+            settled = (done.set_exception, error)
+        with contextlib.suppress(RuntimeError):
+            loop.call_soon_threadsafe(settle, *settled)
+
+    threading.Thread(target=work, name="tombolo-call", daemon=True).start()
+    return await done
+
+
+class _Connecting:
+    """A connection that is made by `await`, or for the length of an `async with` block."""
+
+    def __init__(self, connect: Callable[[], Run]) -> None:
+        self._connect = connect
+        self._made: Optional[AsyncRun] = None
+
+    def __await__(self) -> Generator[Any, None, AsyncRun]:
+        return self._make().__await__()
+
+    async def _make(self) -> AsyncRun:
+        return (await _in_thread(self._connect)).aio
+
+    async def __aenter__(self) -> AsyncRun:
+        self._made = await self._make()
+        return self._made
+
+    async def __aexit__(self, *error: object) -> None:
+        if self._made is not None:
+            await self._made.close()
+
+
+def connect(link: Union[str, os.PathLike[str]], **settings: Any) -> _Connecting:
+    """Connect to a run, as `tombolo.connect` does: ``await`` it, or have the end of an ``async with`` block close it.
+
+    Parameters
+    ----------
+    link : str or path
+        As of `tombolo.connect`.
+    **settings
+        As of `tombolo.connect`.
+
+    Returns
+    -------
+    awaitable of AsyncRun
+        The run, which an `async with` block gives too.
+
+    Examples
+    --------
+    ::
+
+        async def watch():
+            async with tombolo.aio.connect("http://127.0.0.1:7070/?token=...", watch=True) as aio:
+                status = await aio.wait_for_cycle(3)
+                print(status.cycle, aio.run.features)
+    """
+    return _Connecting(lambda: _connect(link, **settings))
 
 
 class AsyncOrder:
@@ -60,7 +165,7 @@ class AsyncOrder:
 
     async def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
         """As `Order.wait`."""
-        return await _in_slices(lambda left: self.order.wait(left, until=until), timeout)
+        return await _carry_out(self.order._run._reader, self.order._wait(timeout, until))
 
     async def cancel(self, *, timeout: Optional[float] = None) -> Command:
         """As `Order.cancel`."""
@@ -80,9 +185,9 @@ class _Events(AsyncIterator["Event"]):
 
     async def __anext__(self) -> Event:
         while not self._is_over:
-            # The thread only waits: of one that was cancelled the event would be lost.
+            # It is taken behind the wait: of one that was cancelled the event would be lost.
             try:
-                await _in_slices(lambda left: self._reader.wait_for(lambda: len(self._waiting) > 0, left), None)
+                await _wait_for(self._reader, lambda: len(self._waiting) > 0, None)
             except CallError:
                 break
             if self._waiting:
@@ -135,10 +240,11 @@ class AsyncRun:
         replaces: Union[Order, str, None] = None,
     ) -> AsyncOrder:
         """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
-        text, name = await asyncio.to_thread(
-            lambda: _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
-        )
-        return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(text, name))))
+        prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+        return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(prepared))))
+
+    async def _prepared(self, edits: Edits, **settings: Any) -> _native.Prepared:
+        return await _in_thread(lambda: self.run._prepared(_text(edits, **settings)))
 
     async def undo(self, count: int = 1) -> AsyncOrder:
         """As `Run.undo`."""
@@ -155,22 +261,26 @@ class AsyncRun:
         timeout: Optional[float] = None,
     ) -> Forecast:
         """As `Run.forecast`."""
-        text, name = await asyncio.to_thread(lambda: _text(edits, schedule=schedule, deform=deform, guard=guard))
-        question = await self._send(lambda client: client.forecast(text, name))
-        return await _in_slices(lambda left: self.run._foretold(question, left), timeout)
+        prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
+        question = await self._send(lambda client: client.forecast(prepared))
+        return await self._carry_out(self.run._foretold(question, timeout))
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
         """As `Run.link_for`."""
-        return await asyncio.to_thread(lambda: self.run.link_for(rights, timeout))
+        return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
     async def _send(self, send: Callable[[_native.Client], str]) -> str:
         """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
         await self.drive()
-        return await asyncio.to_thread(lambda: send(self.run._reader.client))
+        # Behind the last wait, on the loop: it only queues.
+        return send(self.run._reader.client)
+
+    async def _carry_out(self, parts: Parts[Result]) -> Result:
+        return await _carry_out(self.run._reader, parts)
 
     async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
         command = Command(self.run, await self._send(send), task)
-        return await _in_slices(command.wait, timeout)
+        return await self._carry_out(command._wait(timeout))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
@@ -202,37 +312,36 @@ class AsyncRun:
     async def drive(self, timeout: float = 8.0) -> None:
         """As `Run.drive`."""
         until = clock.monotonic() + timeout
-        while not await asyncio.to_thread(self.run._ask_for_wheel, until):
+        while not await _in_thread(lambda: self.run._ask_for_wheel(until)):
             pass
 
     async def surface(self) -> Surface:
         """As `Run.surface`."""
-        return await asyncio.to_thread(lambda: self.run.surface)
+        return await _in_thread(lambda: self.run.surface)
 
     async def stack(self) -> list[dict[str, Any]]:
         """As `Run.stack`."""
-        return await asyncio.to_thread(lambda: self.run.stack)
+        return await _in_thread(lambda: self.run.stack)
 
     async def pipelines(self) -> list[dict[str, Any]]:
         """As `Run.pipelines`."""
-        return await asyncio.to_thread(lambda: self.run.pipelines)
+        return await _in_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
-        """As `Run.wait_for`; `found` is called on another thread."""
-        return await _in_slices(lambda left: self.run.wait_for(found, left), timeout)
+        """As `Run.wait_for`; `found` is called on the loop."""
+        return await _wait_for(self.run._reader, found, timeout)
 
     async def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
         """As `Run.wait_for_cycle`."""
-        return await _in_slices(lambda left: self.run.wait_for_cycle(cycle, left), timeout)
+        return await self._carry_out(self.run._wait_for_cycle(cycle, timeout))
 
     async def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
         """As `Run.wait_for_view`."""
-        await asyncio.to_thread(self.run._announced, name, timeout)
-        return await _in_slices(lambda left: self.run.wait_for_view(name, after=after, timeout=left), timeout)
+        return await self._carry_out(self.run._wait_for_view(name, after, timeout))
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """As `Run.wait`."""
-        return await _in_slices(self.run.wait, timeout)
+        return await self._carry_out(self.run._wait_for_end(timeout))
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
         """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
@@ -241,4 +350,4 @@ class AsyncRun:
 
     async def close(self) -> None:
         """As `Run.close`."""
-        await asyncio.to_thread(self.run.close)
+        await _in_thread(self.run.close)

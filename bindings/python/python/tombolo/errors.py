@@ -36,7 +36,7 @@ class MeshError(TomboloError, ValueError):
 
 
 class StepError(TomboloError, ValueError):
-    """A step that cannot be: a negative cycle, a time that is not finite, no channel, the steered channel gone."""
+    """A step that cannot be: a negative cycle, a time that is not finite, no channel, a run that others have ended."""
 
 
 class CallError(TomboloError, RuntimeError):
@@ -44,7 +44,7 @@ class CallError(TomboloError, RuntimeError):
 
 
 class FailedError(TomboloError, RuntimeError):
-    """Something was not done: an address in use, a file that cannot be written, too much that waits."""
+    """Something was not done: an address in use, a file that cannot be written, a solver that failed elsewhere."""
 
 
 class LinkError(TomboloError, ConnectionError):

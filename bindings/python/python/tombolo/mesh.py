@@ -85,6 +85,9 @@ class Mesh:
     order, negative strides or float16, is copied once it is looked at or is an error that says so. An array of
     `numpy.ma` of which values are masked is an error.
 
+    Fields and named parts are read at steps that look at them (`Adaptor.looks_at`), and where the mesh has another size
+    than before: what is wrong with one, such as its length, is told then.
+
     Examples
     --------
     >>> import numpy as np, tombolo

@@ -39,6 +39,16 @@ class MonitorTable(Mapping[str, NDArray[np.float64]]):
         self._begin = 0
         self._end = 0
 
+    def __getstate__(self) -> dict[str, Any]:
+        # A lock cannot be copied. A copy has the rows that there are now.
+        with self._lock:
+            columns = {name: column[self._begin : self._end].copy() for name, column in self._columns.items()}
+            return {"pipeline": self.pipeline, "_columns": columns, "_begin": 0, "_end": self._end - self._begin}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.Lock()
+
     def _announce(self, name: str) -> None:
         """Have a column for a monitor, which may have no row yet."""
         with self._lock:

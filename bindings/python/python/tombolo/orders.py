@@ -8,7 +8,7 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
-from ._waiting import moment_after
+from ._waiting import Parts, moment_after
 from .errors import EndedError, RejectedError, TomboloError
 
 if TYPE_CHECKING:
@@ -109,11 +109,14 @@ class Order:
         WaitError
             It did not come so far in time; it may still.
         """
+        return self._run._reader.carry_out(self._wait(timeout, until))
+
+    def _wait(self, timeout: Optional[float], until: str) -> Parts[Order]:
         stages = ("accepted", "computing", "applying", "applied")
         if until not in stages:
             raise ValueError(f"until: found {until!r}, expected one of: {', '.join(stages)}")
         enough = (*stages[stages.index(until) :], "rejected")
-        self._run.wait_for(lambda: self.status in enough, timeout)
+        yield (lambda: self.status in enough), timeout
         if self.status == "rejected":
             raise RejectedError(self.reason or "no reason given", dict(self.report))
         return self
@@ -229,9 +232,12 @@ class Command:
         WaitError
             It did not take effect in time; it may still.
         """
+        return self._run._reader.carry_out(self._wait(timeout))
+
+    def _wait(self, timeout: Optional[float]) -> Parts[Command]:
         until = moment_after(timeout)
         try:
-            answer = self._run.wait_for(self._answer, timeout)
+            answer = yield self._answer, timeout
         except EndedError:
             # A run that was asked to stop may end before it has answered.
             if self.task == "stop":
@@ -240,19 +246,15 @@ class Command:
         if answer is not None and answer[0] == "error":
             raise RejectedError(answer[1]["message"])
         if self.task in ("pause", "resume"):
-            self._wait_for_status(self.task == "pause", min(until - clock.monotonic(), _STATUS))
+            # The status comes behind the answer. Somebody else may have had it otherwise by then, or the run may be
+            # over: it has taken effect all the same.
+            with contextlib.suppress(TomboloError):
+                yield self._is_shown, min(until - clock.monotonic(), _STATUS)
         return self
 
-    def _wait_for_status(self, paused: bool, timeout: float) -> None:
-        """Wait for the status that comes behind the answer."""
-
-        def is_shown() -> bool:
-            status = self._run._state.status
-            return status is not None and status.paused == paused
-
-        # Somebody else may have had it otherwise by then, or the run may be over: it has taken effect all the same.
-        with contextlib.suppress(TomboloError):
-            self._run.wait_for(is_shown, timeout)
+    def _is_shown(self) -> bool:
+        status = self._run._state.status
+        return status is not None and status.paused == (self.task == "pause")
 
     def __repr__(self) -> str:
         return f"<tombolo.Command {self.id}: {self.task}, {'done' if self.done else 'on its way'}>"

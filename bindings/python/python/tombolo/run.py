@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _json
 from ._values import number, whole
-from ._waiting import in_thread
+from ._waiting import Parts, in_thread
 from ._watched import Watched
 from .errors import LinkError, NotDriverError, RejectedError, WaitError
 from .orders import Command, Edits, Forecast, Order
 
 if TYPE_CHECKING:
+    from . import _native
     from .aio import AsyncRun
     from .jupyter import Plot
 
@@ -132,9 +133,14 @@ class Run(Watched):
                               schedule={"steps": 10})
             order.wait()
         """
-        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+        prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces))
         self.drive()
-        return Order(self, in_thread(lambda: self._reader.client.order(text, name)))
+        return Order(self, self._reader.client.order(prepared))
+
+    def _prepared(self, order: tuple[str, str]) -> _native.Prepared:
+        """An order that was read, with the numbers of the displacements whose files it names."""
+        client = self._reader.client
+        return in_thread(lambda: client.prepare(*order))
 
     def forecast(
         self,
@@ -146,13 +152,13 @@ class Run(Watched):
         timeout: Optional[float] = None,
     ) -> Forecast:
         """Ask what an order would come to, were it given now; nothing changes. The parameters are those of `order`."""
-        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard)
+        prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard))
         self.drive()
-        return self._foretold(in_thread(lambda: self._reader.client.forecast(text, name)), timeout)
+        return self._reader.carry_out(self._foretold(self._reader.client.forecast(prepared), timeout))
 
-    def _foretold(self, question: str, timeout: Optional[float]) -> Forecast:
+    def _foretold(self, question: str, timeout: Optional[float]) -> Parts[Forecast]:
         """Wait for the answer to a forecast that was asked for."""
-        kind, data = self.wait_for(lambda: self._state.answers.get(question), timeout) or ("", {})
+        kind, data = yield (lambda: self._state.answers.get(question)), timeout
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])
@@ -282,7 +288,14 @@ def _text(
     return _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other})
 
 
-def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: bool = True, attempts: int = 10) -> Run:
+def connect(
+    link: Union[str, os.PathLike[str]],
+    *,
+    watch: bool = False,
+    views: bool = True,
+    attempts: int = 10,
+    timeout: Optional[float] = None,
+) -> Run:
     """Connect to a run.
 
     Parameters
@@ -295,6 +308,9 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         Whether the frames of the live views are wanted.
     attempts : int
         How often a connection that is lost is tried to be made again, with growing pauses: 10 take about a minute.
+    timeout : float, optional
+        Seconds that the run may take to answer, now and to each question later (`Run.surface`, `stack`, `pipelines`).
+        Left out: 20 now, and 120 later, as a run may have a large surface to prepare.
 
     Returns
     -------
@@ -305,6 +321,8 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
     ------
     LinkError
         The run is not reached: the text says why.
+    WaitError
+        It does not answer within `timeout`.
 
     Examples
     --------
@@ -325,4 +343,5 @@ def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: b
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
-    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0))
+    patience = None if timeout is None else number(timeout, "timeout")
+    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0), timeout=patience)

@@ -110,12 +110,28 @@ def _of_meshio(mesh: Any) -> Mesh:
     faces = faces_of_features(
         ((kind, rows, numbers) for kind, (rows, numbers) in parts.items() if _DIMENSIONS.get(kind) == 2), names
     )
+    faces = _sets_of_meshio(mesh) if faces is None else faces
     return Mesh(
         mesh.points,
         cells,
         faces=faces,
         vertex_features=mesh.point_data.get("features") if faces is None else None,
     )
+
+
+def _sets_of_meshio(mesh: Any) -> Optional[Faces]:
+    """The faces in each of meshio's named sets of cells."""
+    named: dict[str, dict[Union[str, int], ArrayLike]] = {}
+    for name, chosen in mesh.cell_sets.items():
+        # Sets such as `gmsh:bounding_entities` are meshio's own, and no sets of cells.
+        parts = [] if name.startswith("gmsh:") else zip(mesh.cells, chosen)
+        of_kind: dict[Union[str, int], list[NDArray[Any]]] = {}
+        for block, rows in parts:
+            if rows is not None and len(rows) and _DIMENSIONS.get(block.type) == 2:
+                of_kind.setdefault(block.type, []).append(block.data[np.asarray(rows, np.int64)])
+        if of_kind:
+            named[name] = {kind: np.concatenate(rows) for kind, rows in of_kind.items()}
+    return named or None
 
 
 def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
@@ -148,11 +164,12 @@ class Shaper:
     mesh : Mesh, meshio.Mesh, pyvista mesh, vtkDataSet, or array of shape (n, 2) or (n, 3)
         The mesh, or the coordinates of its vertices. It is copied. Features are those that the program finds in the
         file that it was read from: Gmsh's physical surfaces by name, where meshio has read them (PyVista does not keep
-        the names), and the array `features` of VTK.
+        the names), and the array `features` of VTK. Without these, meshio's named sets of faces (`cell_sets`, such as
+        those of Abaqus, MED and XDMF).
     cells : dict, optional
         With coordinates: the cells, as `Mesh` takes them.
-    faces : dict, optional
-        With coordinates: named parts of the boundary, as `Mesh` takes them.
+    faces, features : dict, optional
+        With coordinates: named parts of the boundary, as `Mesh` takes them, under either name.
     angle : float, optional
         Name the parts of the surface between edges of so many degrees or more, whatever parts the mesh names.
 
@@ -180,8 +197,12 @@ class Shaper:
         cells: Optional[Cells] = None,
         faces: Optional[Faces] = None,
         *,
+        features: Optional[Faces] = None,
         angle: Optional[float] = None,
     ) -> None:
+        if faces is not None and features is not None:
+            raise MeshError("features: found faces beside them, expected one of the two: they are the same")
+        faces = features if faces is None else faces
         if cells is not None:
             mesh = Mesh(mesh, cells, faces=faces)
         elif faces is not None:

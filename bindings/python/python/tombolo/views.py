@@ -12,6 +12,9 @@ from ._names import unknown
 
 __all__ = ["Surface", "View", "Views"]
 
+#: What meshio calls faces of so many vertices.
+_POLYGONS = {3: "triangle", 4: "quad"}
+
 
 def _of(fields: Mapping[str, NDArray[np.float64]], associations: Mapping[str, str], kind: str) -> dict[str, Any]:
     return {name: values for name, values in fields.items() if associations[name] == kind}
@@ -162,6 +165,24 @@ class Surface(NamedTuple):
         from . import vtk
 
         return pyvista.wrap(vtk.of_surface(self))
+
+    def to_meshio(self) -> Any:
+        """The surface as a `meshio.Mesh` with the cell data `features` and their names; needs meshio."""
+        import meshio
+
+        sizes = np.diff(self.offsets)
+        chosen = [(size, np.flatnonzero(sizes == size)) for size in np.unique(sizes).tolist()]
+        cells = [
+            (_POLYGONS.get(size, "polygon"), self.connectivity[self.offsets[faces][:, None] + np.arange(size)])
+            for size, faces in chosen
+        ]
+        return meshio.Mesh(
+            self.points.copy(),
+            [(kind, rows.astype(np.int64)) for kind, rows in cells],
+            point_data={"vertices": self.vertices.astype(np.int64)},
+            cell_data={"features": [self.features[faces].astype(np.int32) for _, faces in chosen]},
+            field_data={name: np.array([number, 2]) for number, name in enumerate(self.names)},
+        )
 
     def __repr__(self) -> str:
         return f"<tombolo.Surface: {len(self.points)} points, features: {', '.join(self.names)}>"
