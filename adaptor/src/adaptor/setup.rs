@@ -85,7 +85,8 @@ impl Adaptor {
                 }
             }
         }
-        let queue = Arc::new(Queue::default());
+        let limits = config.stream.as_ref().map(|stream| stream.limits).unwrap_or_default();
+        let queue = Arc::new(Queue::new(&limits));
         let has_audience = config.stream.is_some() || config.record.is_some();
         let hub = (has_audience && first).then(|| Arc::new(Hub::new(Arc::clone(&run))));
         if let Some(hub) = &hub {

@@ -387,8 +387,8 @@ async fn serve(
 ) {
     let hub = Arc::clone(&shared.hub);
     let commands = Arc::clone(&shared.commands);
-    let most = shared.limits.connections.get() as usize;
-    let (listener, entrance) = Listener::new(listening, ways.acceptor.clone(), most);
+    let (listener, entrance) =
+        Listener::new(listening, ways.acceptor.clone(), &shared.limits);
     let router = routes::router(shared).into_make_service_with_connect_info::<Connection>();
     let connecting = async {
         match &ways.relay {
