@@ -185,3 +185,24 @@ fn viewers_commands_and_checkpoints_are_told_with_their_run() {
     assert!(seen[0].get("message").contains("has come"), "{seen:?}");
     assert!(seen[1].get("message").contains("has left"), "{seen:?}");
 }
+
+/// A server that others reach, and a secret that others can read, are warned of.
+#[cfg(unix)]
+#[test]
+fn a_server_on_every_address_and_a_secret_that_others_can_read_are_warned_of() {
+    use std::os::unix::fs::PermissionsExt;
+    listen();
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("run.json");
+    let text = r#"{"version": 1, "stream": {"listen": "0.0.0.0:0", "token": "0123456789abcdef"}}"#;
+    std::fs::write(&file, text).expect("written");
+    for mode in [0o600, 0o644] {
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(mode)).expect("set");
+        let adaptor = Settings::from_file(&file).expect("read").start().expect("a run");
+        let run = adaptor.run_id();
+        let open: Vec<_> = told(run, "level", "WARN");
+        let has = |words: &str| open.iter().any(|told| told.get("message").contains(words));
+        assert!(has("every address of this machine"), "{open:?}");
+        assert_eq!(has("chmod 600"), mode == 0o644, "{open:?}");
+    }
+}

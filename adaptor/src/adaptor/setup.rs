@@ -29,7 +29,7 @@ use crate::{
     stages::Pipelines,
     steering::{Defaults, EditStack, Events, Log, Parameters, Queue, Timed},
     step::Moment,
-    stream::{Clock, Hub, Server},
+    stream::{Clock, Hub, Server, warn_of_readable_token},
     watch::Watch,
 };
 
@@ -120,6 +120,9 @@ impl Adaptor {
             Arc::clone(&log),
             Arc::clone(&clock),
         ));
+        if let (Some(stream), Some(file), true) = (&config.stream, &file, first) {
+            warn_of_readable_token(&run, stream, file);
+        }
         let forecaster = Arc::default();
         let server = match (&config.stream, &hub) {
             (Some(stream), Some(hub)) => {

@@ -4,7 +4,7 @@
 use std::{
     cmp::Reverse,
     collections::VecDeque,
-    fs::{File, OpenOptions},
+    fs::{File, Metadata, OpenOptions},
     io::{Read, Write},
     net::IpAddr,
     path::Path,
@@ -402,11 +402,35 @@ pub(super) fn open_private(path: &Path) -> Result<File, String> {
     if !metadata.is_file() {
         return Err(wrong("it is no file"));
     }
-    #[cfg(unix)]
-    if std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0 {
+    if is_open_to_others(&metadata) {
         return Err(wrong("others than its owner can get at it; `chmod 600` it"));
     }
     Ok(file)
+}
+
+/// Whether others than its owner can get at a file.
+#[cfg(unix)]
+fn is_open_to_others(metadata: &Metadata) -> bool {
+    std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0
+}
+
+#[cfg(not(unix))]
+fn is_open_to_others(_: &Metadata) -> bool {
+    false
+}
+
+/// Warns of a secret in a configuration that others than its owner can read.
+pub(crate) fn warn_of_readable_token(run: &str, settings: &StreamServer, file: &Path) {
+    let is_open = || std::fs::metadata(file).is_ok_and(|metadata| is_open_to_others(&metadata));
+    if settings.token.is_some() && is_open() {
+        let path = file.display();
+        tracing::warn!(
+            run,
+            %path,
+            "others than its owner can get at {path}, and with `stream.token` in it at the run: `chmod 600` it, or give the \
+             secret in the file that `stream.secrets` names"
+        );
+    }
 }
 
 /// Reads a file of secrets.

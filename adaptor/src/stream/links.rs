@@ -301,6 +301,22 @@ pub(super) fn fragment(sha256: Option<&str>) -> String {
     sha256.map_or_else(String::new, |digits| format!("#sha256={digits}"))
 }
 
+/// Warns of a server that listens on every address of the machine: what is reachable then, and what its
+/// links name.
+pub(super) fn warn_of_open(run: Option<&str>, address: SocketAddr) {
+    if !address.ip().is_unspecified() {
+        return;
+    }
+    let named = authority(address);
+    tracing::warn!(
+        run,
+        %address,
+        "viewers are listened to on every address of this machine, from every network that it is in: whoever reaches {address} \
+         can connect, and needs a secret to see anything. The links lead to {named}, which may be known by that name to \
+         this machine alone; `stream.listen` takes one address"
+    );
+}
+
 /// The host and port at which a server is reached that listens on an address: the machine's name where
 /// it listens on all.
 pub(super) fn authority(address: SocketAddr) -> String {

@@ -78,6 +78,7 @@ pub(crate) use surface::ReferenceSurface;
 use connect::Connect;
 use connection::Connection;
 use credentials::{Access, Credentials};
+pub(crate) use credentials::warn_of_readable_token;
 use gate::{Gate, Refusals};
 use links::Links;
 use listener::Listener;
@@ -242,6 +243,9 @@ impl Server {
         let identity = match &place {
             Some(place) => Identity::of_server(settings, place)?,
             None => None,
+        if let Some(Place::Address(address)) = &place {
+            links::warn_of_open(hub.run(), *address);
+        }
         };
         let is_loopback =
             matches!(&place, Some(Place::Address(address)) if address.ip().is_loopback());
