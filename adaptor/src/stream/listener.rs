@@ -11,6 +11,7 @@ use tombolo_pipelines::language::StreamLimits;
 use super::{
     connection::{Connection, TimedStream, Way},
     pool::Pool,
+    refusals::Refusals,
     socket::{Accepted, Listening},
 };
 use crate::dial::Stream;
@@ -41,9 +42,11 @@ impl Listener {
         socket: Option<Listening>,
         acceptor: Option<TlsAcceptor>,
         limits: &StreamLimits,
+        refusals: &Arc<Refusals>,
     ) -> (Self, Entrance) {
         let (sender, ready) = mpsc::channel(READY);
-        let entrance = Entrance { pool: Arc::new(Pool::new(limits)), ready: sender };
+        let pool = Arc::new(Pool::new(limits, Arc::clone(refusals)));
+        let entrance = Entrance { pool, ready: sender };
         let mut accepting = JoinSet::new();
         if let Some(socket) = socket {
             accepting.spawn(accept(socket, acceptor, entrance.clone()));

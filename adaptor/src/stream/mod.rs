@@ -37,6 +37,7 @@ mod pace;
 mod people;
 mod playback;
 mod pool;
+mod refusals;
 pub mod relay;
 mod relay_messages;
 mod routes;
@@ -77,11 +78,12 @@ pub(crate) use surface::ReferenceSurface;
 
 use connect::Connect;
 use connection::Connection;
-use credentials::{Access, Credentials};
 pub(crate) use credentials::warn_of_readable_token;
-use gate::{Gate, Refusals};
+use credentials::{Access, Credentials};
+use gate::Gate;
 use links::Links;
 use listener::Listener;
+use refusals::Refusals;
 use socket::{Listening, Place, Socket};
 use tls::Identity;
 use tokio_rustls::TlsAcceptor;
@@ -240,12 +242,12 @@ impl Server {
             })
         };
         let (socket, place) = settings.place().map(bind).transpose()?.unzip();
-        let identity = match &place {
-            Some(place) => Identity::of_server(settings, place)?,
-            None => None,
         if let Some(Place::Address(address)) = &place {
             links::warn_of_open(hub.run(), *address);
         }
+        let identity = match &place {
+            Some(place) => Identity::of_server(settings, place)?,
+            None => None,
         };
         let is_loopback =
             matches!(&place, Some(Place::Address(address)) if address.ip().is_loopback());
@@ -253,7 +255,7 @@ impl Server {
         hub.set_driver_silence(Duration::from_secs(settings.limits.driver_silence.get().into()));
         let gate = Gate {
             credentials: Arc::clone(&credentials),
-            refusals: Refusals::default(),
+            refusals: Arc::new(Refusals::of_run(hub.run())),
             is_loopback,
             public: None,
             is_encrypted: identity.is_some(),
@@ -392,7 +394,7 @@ async fn serve(
     let hub = Arc::clone(&shared.hub);
     let commands = Arc::clone(&shared.commands);
     let (listener, entrance) =
-        Listener::new(listening, ways.acceptor.clone(), &shared.limits);
+        Listener::new(listening, ways.acceptor.clone(), &shared.limits, &shared.gate.refusals);
     let router = routes::router(shared).into_make_service_with_connect_info::<Connection>();
     let connecting = async {
         match &ways.relay {

@@ -11,7 +11,10 @@ use std::{
 use futures_util::task::AtomicWaker;
 use tombolo_pipelines::language::StreamLimits;
 
-use super::credentials::Access;
+use super::{
+    credentials::Access,
+    refusals::{Refusals, Refused},
+};
 use crate::lock::lock;
 
 /// Connections beyond the limit for those who may drive.
@@ -49,6 +52,7 @@ pub(super) struct Pool {
     /// Those that may have shown none, and of these from one address that is not this machine's.
     unknown: usize,
     unknown_of_address: usize,
+    pub(super) refusals: Arc<Refusals>,
 }
 
 #[derive(Debug, Default)]
@@ -59,12 +63,13 @@ struct Open {
 }
 
 impl Pool {
-    pub(super) fn new(limits: &StreamLimits) -> Self {
+    pub(super) fn new(limits: &StreamLimits, refusals: Arc<Refusals>) -> Self {
         Self {
             open: Mutex::default(),
             most: limits.connections.get() as usize,
             unknown: limits.unknown_connections.get() as usize,
             unknown_of_address: limits.unknown_connections_of_address.get() as usize,
+            refusals,
         }
     }
 
@@ -92,6 +97,11 @@ impl Pool {
             open.unknown.remove(oldest).cut();
         }
         open.unknown.push(Arc::clone(&guest));
+        drop(open);
+        if oldest.is_some() {
+            let what = || format!("a connection from {address} has ended an older one");
+            self.refusals.tell(address, Refused::Crowd, None, what);
+        }
         guest
     }
 
@@ -126,8 +136,9 @@ mod tests {
     use super::*;
 
     fn pool() -> Pool {
-        let limits = r#"{"connections": 2, "unknown_connections": 50, "unknown_connections_of_address": 5}"#;
-        Pool::new(&serde_json::from_str(limits).expect("limits"))
+        let limits =
+            r#"{"connections": 2, "unknown_connections": 50, "unknown_connections_of_address": 5}"#;
+        Pool::new(&serde_json::from_str(limits).expect("limits"), Arc::default())
     }
 
     fn address(last: u8) -> IpAddr {

@@ -41,6 +41,7 @@ use super::{
     gate::{self, Gate},
     links::{LinkFile, authority, fragment, with_colons},
     listener::Listener,
+    refusals::Refusals,
     relay_messages::{ATTACH, CARRY},
     socket::Socket,
     tls::{Identity, names_of},
@@ -183,10 +184,11 @@ impl Relay {
             None if is_open => Some(Identity::kept(directory, names_of(address))?),
             None => None,
         };
+        let refusals = Arc::<Refusals>::default();
         let state = Arc::new(RelayState {
             gate: Gate {
                 credentials: Arc::clone(&credentials),
-                refusals: gate::Refusals::default(),
+                refusals: Arc::clone(&refusals),
                 is_loopback: !is_open,
                 public: settings.public.as_deref().and_then(host_of).map(str::to_owned),
                 is_encrypted: identity.is_some(),
@@ -210,7 +212,8 @@ impl Relay {
             let acceptor = identity.map(|identity| identity.acceptor);
             match listening {
                 Ok(listening) => runtime.block_on(async move {
-                    let (listener, _) = Listener::new(Some(listening), acceptor, &limits);
+                    let (listener, _) =
+                        Listener::new(Some(listening), acceptor, &limits, &refusals);
                     let router = router.into_make_service_with_connect_info::<Connection>();
                     tokio::select! {
                         _ = axum::serve(listener, router) => {}
@@ -334,7 +337,7 @@ async fn guard(
         None => next.run(request).await,
     };
     if is_own || is_answered {
-        relay.gate.log_refusal(None, &connection, &response);
+        relay.gate.log_refusal(&connection, &response);
         gate::add_headers(&mut response);
     }
     response
