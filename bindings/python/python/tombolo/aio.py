@@ -133,10 +133,11 @@ class AsyncRun:
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
         replaces: Union[Order, str, None] = None,
+        deadline: Optional[int] = None,
     ) -> AsyncOrder:
         """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
         text, name = await asyncio.to_thread(
-            lambda: _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+            lambda: _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline)
         )
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(text, name))))
 

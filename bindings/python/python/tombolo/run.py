@@ -103,6 +103,7 @@ class Run(Watched):
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
         replaces: Union[Order, str, None] = None,
+        deadline: Optional[int] = None,
     ) -> Order:
         """Give an order of a new shape; it is on its way when this returns, and `Order.wait` waits for it.
 
@@ -116,6 +117,8 @@ class Run(Watched):
             the run's configuration says.
         replaces : Order or str, optional
             An order that has not begun to move the mesh, whose place this one takes; that one is rejected.
+        deadline : int, optional
+            Seconds that it may wait for its turn, where the run's configuration does not say less; it is rejected then.
 
         Raises
         ------
@@ -132,7 +135,7 @@ class Run(Watched):
                               schedule={"steps": 10})
             order.wait()
         """
-        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+        text, name = _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline)
         self.drive()
         return Order(self, in_thread(lambda: self._reader.client.order(text, name)))
 
@@ -276,10 +279,12 @@ def _text(
     deform: Optional[Mapping[str, Any]] = None,
     guard: Optional[Mapping[str, Any]] = None,
     replaces: Union[Order, str, None] = None,
+    deadline: Optional[int] = None,
 ) -> tuple[str, str]:
     """An order as a text with its name."""
     other = replaces.id if isinstance(replaces, Order) else replaces
-    return _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other})
+    settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other, "deadline": deadline}
+    return _json.order(edits, settings)
 
 
 def connect(link: Union[str, os.PathLike[str]], *, watch: bool = False, views: bool = True, attempts: int = 10) -> Run:
