@@ -46,6 +46,19 @@ fn a_signal_ends_a_run_with_all_that_it_leaves_behind() {
 }
 
 #[test]
+fn a_terminal_that_is_gone_ends_a_run_as_a_signal_does() {
+    let small = endless(|_| ());
+    let report = ends(&small, "HUP", |run| {
+        run.link();
+        None
+    });
+    assert!(report["error"].is_null(), "{report}");
+    let left = fs::read_dir(small.path("out")).expect("the folder");
+    let names: Vec<_> = left.map(|file| file.expect("a file").file_name()).collect();
+    assert!(names.iter().all(|name| !name.to_string_lossy().ends_with(".link")), "{names:?}");
+}
+
+#[test]
 fn a_signal_ends_a_run_that_is_paused() {
     let small = endless(|pipelines| {
         let hold = json!({"name": "hold", "at": {"cycle": 2}, "stages": [{"pause": {}}]});

@@ -11,7 +11,7 @@ use tombolo_deform::{
 };
 use tombolo_pipelines::{
     language::{self, Config, ReadError, Recording, TimedCommand},
-    limits::{DOCUMENT, WAITING_BYTES},
+    limits::DOCUMENT,
 };
 
 use crate::{
@@ -96,7 +96,7 @@ impl Settings {
     /// [`ReadError`], which names the file, and the line and column of everything that is wrong.
     pub fn orders_from_file(mut self, file: impl AsRef<Path>) -> Result<Self, ReadError> {
         let file = file.as_ref();
-        let text = language::read_text(file, WAITING_BYTES)?;
+        let text = language::read_orders_text(file)?;
         self.orders.extend(language::check_orders(&text, &file.display().to_string())?);
         Ok(self)
     }
@@ -107,7 +107,7 @@ impl Settings {
     /// [`ReadError`], which names the file, and the line and column of what is wrong.
     pub fn replay_from_file(self, file: impl AsRef<Path>) -> Result<Self, ReadError> {
         let file = file.as_ref();
-        let text = language::read_text(file, WAITING_BYTES)?;
+        let text = language::read_orders_text(file)?;
         let recording = language::parse_journal(&text, &file.display().to_string())?;
         if recording.lost > 0 {
             let (path, lost) = (file.display(), recording.lost);

@@ -97,6 +97,20 @@ fn the_output_of_a_run_is_enough_to_steer_it() {
     assert!(code == 1 && said.contains(reason), "{code}: {said}");
 }
 
+/// With port 0 the file of each run has another name.
+#[test]
+fn the_links_that_a_killed_run_has_left_are_removed_by_the_next() {
+    let first = Run::new(json!({"listen": "127.0.0.1:0"}));
+    let at = first.directory.path();
+    let left = at.join("tombolo-1.link");
+    std::fs::copy(told(&first.invitation), &left).expect("copied");
+    let config = config(r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}}"#);
+    let mut next = Solver::new(Settings { config, output: at.into(), ..Settings::default() });
+    let invitation = next.adaptor.invitation(false).expect("written").expect("a server");
+    assert!(!left.exists());
+    assert!(told(&first.invitation).exists() && told(&invitation).exists());
+}
+
 #[test]
 fn a_link_that_works_less_than_was_thought_is_explained() {
     let run = Run::new(json!({"listen": "127.0.0.1:0"}));

@@ -185,3 +185,73 @@ fn viewers_commands_and_checkpoints_are_told_with_their_run() {
     assert!(seen[0].get("message").contains("has come"), "{seen:?}");
     assert!(seen[1].get("message").contains("has left"), "{seen:?}");
 }
+
+/// What was refused is told once, with who and what: a flood, a long message, a command of one who watches.
+#[test]
+fn what_is_refused_is_told_once_with_who_and_what() {
+    listen();
+    let text = LINK_TO_ALL.replace(
+        "127.0.0.1:0\"",
+        "127.0.0.1:0\", \"limits\": {\"messages\": 20, \"messages_at_once\": 3, \"unknown_connections\": 2}",
+    );
+    let solver = Solver::new(Settings { config: config(&text), ..Settings::default() });
+    let run = solver.adaptor.run_id().to_owned();
+    let told = |reason: &str| {
+        let told = told(&run, "reason", reason);
+        assert_eq!(told.len(), 1, "{reason}: {told:?}");
+        assert_eq!(told[0].get("address"), "127.0.0.1", "{told:?}");
+        told[0].clone()
+    };
+    let link = solver.adaptor.watching_link().expect("a server");
+    let socket = link.replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);
+    let mut watcher = Viewer::try_connect(&socket).expect("connected");
+    watcher.hello();
+    watcher.send(&json!({"id": "p", "pause": {}}));
+    watcher.wait_for("error", |error| error["id"] == "p");
+    watcher.send(&json!({"id": "s", "stop": {}}));
+    watcher.wait_for("error", |error| error["id"] == "s");
+    let command = told("this viewer does not drive");
+    assert_eq!((command.get("viewer"), command.get("level")), ("c1", "WARN"));
+    assert!(command.get("message").contains("asked for pause"), "{command:?}");
+    watcher.send_text(&" ".repeat(5000));
+    watcher.wait_for("error", |error| error["id"].is_null());
+    let long = told("it is longer than it may be");
+    assert!(long.get("message").contains("c1 from 127.0.0.1 of 5000 bytes"), "{long:?}");
+    // More than three at once, which wait then.
+    (0..10).for_each(|_| watcher.send(&json!({"stop": {}})));
+    (0..10).for_each(|_| drop(watcher.wait_for("error", |_| true)));
+    assert_eq!(told("it sends more messages than it may").get("viewer"), "c1");
+    let address = solver.adaptor.address().expect("a server");
+    let connect = || std::net::TcpStream::connect(address).expect("connected");
+    let mut half = connect();
+    std::io::Write::write_all(&mut half, b"GET / HTTP/1.1\r\nHost:").expect("sent");
+    let mut end = Vec::new();
+    let _ = std::io::Read::read_to_end(&mut half, &mut end);
+    assert_eq!(told("it began a request and did not end it in time").get("level"), "INFO");
+    let crowd: Vec<_> = (0..6).map(|_| connect()).collect();
+    for mut ended in crowd.into_iter().take(4) {
+        let _ = std::io::Read::read_to_end(&mut ended, &mut end);
+    }
+    told("too many connections at once have shown no secret");
+}
+
+/// A server that others reach, and a secret that others can read, are warned of.
+#[cfg(unix)]
+#[test]
+fn a_server_on_every_address_and_a_secret_that_others_can_read_are_warned_of() {
+    use std::os::unix::fs::PermissionsExt;
+    listen();
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("run.json");
+    let text = r#"{"version": 1, "stream": {"listen": "0.0.0.0:0", "token": "0123456789abcdef"}}"#;
+    std::fs::write(&file, text).expect("written");
+    for mode in [0o600, 0o644] {
+        std::fs::set_permissions(&file, PermissionsExt::from_mode(mode)).expect("set");
+        let adaptor = Settings::from_file(&file).expect("read").start().expect("a run");
+        let run = adaptor.run_id();
+        let open: Vec<_> = told(run, "level", "WARN");
+        let has = |words: &str| open.iter().any(|told| told.get("message").contains(words));
+        assert!(has("every address of this machine"), "{open:?}");
+        assert_eq!(has("chmod 600"), mode == 0o644, "{open:?}");
+    }
+}

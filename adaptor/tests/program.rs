@@ -205,6 +205,34 @@ fn a_run_that_does_not_start_tells_every_error() {
     assert_eq!(failure.to_string().lines().count(), 2, "{failure}");
 }
 
+/// Earlier runs have made a journal longer than any file of orders may be; its newest run is short.
+#[test]
+fn a_journal_is_checked_and_replayed_however_long_it_has_become() {
+    use std::io::{Seek, SeekFrom, Write};
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("journal.jsonl");
+    let run = |id: &str| {
+        let settings = r#""version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":1}"#;
+        format!(r#"{{"run":{{"id":"{id}",{settings}}}}}"#)
+    };
+    let mut journal = std::fs::File::create(&path).unwrap();
+    writeln!(journal, "{}", run("before")).unwrap();
+    // Lines of 50 MiB, of which nothing but the ends is on the disk.
+    for line in 1..=6 {
+        journal.seek(SeekFrom::Start(line * (50 << 20))).unwrap();
+        writeln!(journal).unwrap();
+    }
+    writeln!(journal, "{}", run("newest")).unwrap();
+    let applied = r#"{"id":"a","status":"applied","cycle":5,"time":0.5,"order":{"undo":1}}"#;
+    writeln!(journal, "{applied}").unwrap();
+    let output = tombolo(directory.path(), &["check", "journal.jsonl"]);
+    let said = error_text(&output) + &String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && said.contains("1 command(s), all well"), "{said}");
+    let recording = tombolo::Settings::default().replay_from_file(&path).unwrap().replay.unwrap();
+    assert_eq!((recording.commands.len(), recording.run.unwrap().id), (1, "newest".into()));
+    assert_eq!(tombolo::Settings::default().orders_from_file(&path).unwrap().orders.len(), 1);
+}
+
 #[test]
 fn info_counts_what_is_there() {
     let (directory, _) = with_box("[]");

@@ -157,6 +157,22 @@ fn an_order_that_waits_too_long_is_rejected() {
 }
 
 #[test]
+fn an_order_waits_no_longer_than_it_says_itself() {
+    let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    let (mut solver, mut viewer) = beside_a_long_plan(settings);
+    let mut order = squeeze(0.1);
+    viewer.send(&json!({"id": "patient", "order": order}));
+    order["deadline"] = json!(1);
+    viewer.send(&json!({"id": "late", "order": order}));
+    let late = solver.step_until_told(&mut viewer, "order", has_status("late", "rejected"));
+    let reason = "it has waited for more than 1 seconds (its own `deadline`)";
+    assert_eq!(late["reason"], reason);
+    let is_patient = |order: &tombolo::OrderReport| order.id == "patient" && order.reason.is_none();
+    assert!(solver.adaptor.orders().iter().any(is_patient));
+    solver.finish();
+}
+
+#[test]
 fn an_order_waits_no_longer_in_a_paused_run() {
     let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
     settings.config.steering.deadline = std::num::NonZeroU32::MIN;

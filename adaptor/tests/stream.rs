@@ -209,10 +209,14 @@ fn a_viewer_sees_the_run_and_changes_its_shape() {
     let stack = viewer.wait_for("stack", |_| true);
     assert_eq!(stack, json!({"revision": 1, "edits": 1, "kept": 0, "undoable": 1}));
 
-    viewer.send(&json!({"parameter": {"name": "inflow", "value": 2.0}}));
-    let again = solver
-        .step_until_told(&mut viewer, "hello", |hello| hello["parameters"][0]["value"] == 2.0);
-    assert!(again.get("orders").is_none() && again.get("stack").is_none(), "they were told before");
+    viewer.send(&json!({"id": "set", "parameter": {"name": "inflow", "value": 2.0}}));
+    solver.step_until_told(&mut viewer, "done", |done| done["id"] == "set");
+    // What has changed alone, before it is done.
+    let told = |key: &str| viewer.seen.iter().filter_map(|it| it.get(key)).collect::<Vec<_>>();
+    assert_eq!(told("parameters"), [&json!({"values": {"inflow": 2.0}})]);
+    assert!(told("hello").is_empty(), "a parameter sent a hello");
+    let late = Viewer::connect(&solver.adaptor).hello();
+    assert_eq!(late["parameters"][0]["value"], 2.0);
     viewer.send(&json!({"id": "back", "order": {"undo": 1}}));
     solver.step_until_told(&mut viewer, "order", |order| {
         order["id"] == "back" && order["status"] == "applied"

@@ -93,7 +93,11 @@ pub const ORDERS_BYTES: Limit = limit(
 /// Commands of a file.
 pub const WAITING: Limit = limit("commands", 1 << 16, "a file of orders");
 /// Bytes of a file of commands.
-pub const WAITING_BYTES: Limit = limit("bytes", 256 << 20, "a file of orders, a journal");
+pub const WAITING_BYTES: Limit = limit(
+    "bytes",
+    256 << 20,
+    "a file of orders, and of a journal its newest run with those that it goes on from",
+);
 /// Commands of viewers that wait.
 pub const PENDING: Limit =
     limit("commands that wait", 256, "the commands of viewers whose turn has not come");

@@ -177,6 +177,27 @@ fn so_many_commands_may_wait() {
 }
 
 #[test]
+fn the_limits_of_a_stream_have_ranges_and_defaults() {
+    let parsed = |limits: &str| {
+        let text = format!(r#"{{"version": 1, "stream": {{"limits": {limits}}}}}"#);
+        tombolo_pipelines::language::parse(&text, "a").map(|config| config.stream.unwrap().limits)
+    };
+    let usual = parsed("{}").unwrap();
+    assert_eq!((usual.messages.get(), usual.messages_at_once.get()), (20, 40));
+    assert_eq!(usual.pending(), PENDING);
+    assert_eq!(usual.pending_bytes(), PENDING_BYTES);
+    let keys = ["messages", "messages_at_once", "sessions", "waiting", "waiting_megabytes"];
+    let of_connections = ["unknown_connections", "unknown_connections_of_address"];
+    for key in keys.into_iter().chain(of_connections) {
+        assert!(parsed(&format!(r#"{{"{key}": 10000}}"#)).is_ok(), "{key}");
+        let error = parsed(&format!(r#"{{"{key}": 10001}}"#)).unwrap_err();
+        assert_eq!(error.path, format!("stream.limits.{key}"));
+        assert_eq!(error.message, "found 10001, expected 1 to 10000");
+        assert!(parsed(&format!(r#"{{"{key}": 0}}"#)).is_err(), "{key}");
+    }
+}
+
+#[test]
 fn no_more_of_a_file_is_read_than_may_be_in_it() {
     use tombolo_pipelines::language::read_text;
     let folder = tempfile::tempdir().unwrap();

@@ -331,6 +331,7 @@ function takeMessage(message: ServerMessage): void {
     case "hello": return takeHello(message.body);
     case "status": return store.dispatch({ type: "status", status: message.body, at: performance.now() });
     case "order": return store.dispatch({ type: "order", status: message.body });
+    case "parameters": return store.dispatch({ type: "parameters", values: message.body.values });
     case "stack": return stack.change(message.body);
     case "precision": return store.dispatch({ type: "precision", ...message.body });
     case "forecast": return forecasts.answer(message.body);

@@ -262,7 +262,7 @@ impl Adaptor {
             Command::Cancel(cancel) => self.cancel(&cancel.order, source, moment),
             Command::Parameter(change) => {
                 let set = self.parameters.set(&change.name, change.value);
-                self.describe();
+                self.describe_values();
                 set.map_err(|error| error.to_string())
             }
             Command::Pipelines(change) => {

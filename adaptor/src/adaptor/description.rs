@@ -14,14 +14,27 @@ use crate::{
 impl Adaptor {
     /// Brings what `hello` tells up to date. Whoever reads it writes it out, and not the solver.
     pub(super) fn describe(&self) {
-        let Some(hub) = &self.hub else { return };
+        if let Some(hub) = &self.hub {
+            hub.describe(self.description());
+        }
+    }
+
+    /// Does so where nothing but the values of parameters has changed.
+    pub(super) fn describe_values(&self) {
+        if let Some(hub) = &self.hub {
+            let values = self.parameters.all().iter().map(|it| (it.name.clone(), it.value));
+            hub.describe_values(self.description(), values.collect());
+        }
+    }
+
+    fn description(&self) -> impl Fn() -> Map<String, Value> + Send + Sync + 'static {
         let (views, monitors) = (self.pipelines.views(), self.pipelines.monitors());
         let (views, monitors) = (Arc::clone(views), Arc::clone(monitors));
         let (changed, described) = (self.changed, Arc::clone(&self.described));
         let stream = self.config.stream.as_ref();
         let embed = stream.map(|stream| stream.embed.clone()).unwrap_or_default();
         let (parameters, defaults) = (self.parameters.all().to_vec(), self.defaults.clone());
-        hub.describe(move || {
+        move || {
             let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
             let Defaults { deform, guard, schedule } = &defaults;
             let description = json!({
@@ -38,7 +51,7 @@ impl Adaptor {
                 "defaults": {"deform": deform, "guard": guard, "schedule": schedule},
             });
             if let Value::Object(description) = description { description } else { Map::new() }
-        });
+        }
     }
 
     /// Tells how the stack of edits has changed, where it has.

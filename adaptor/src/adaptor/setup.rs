@@ -29,7 +29,7 @@ use crate::{
     stages::Pipelines,
     steering::{Defaults, EditStack, Events, Log, Parameters, Queue, Timed},
     step::Moment,
-    stream::{Clock, Hub, Server},
+    stream::{Clock, Hub, Server, warn_of_readable_token},
     watch::Watch,
 };
 
@@ -85,7 +85,8 @@ impl Adaptor {
                 }
             }
         }
-        let queue = Arc::new(Queue::default());
+        let limits = config.stream.as_ref().map(|stream| stream.limits).unwrap_or_default();
+        let queue = Arc::new(Queue::new(&limits));
         let has_audience = config.stream.is_some() || config.record.is_some();
         let hub = (has_audience && first).then(|| Arc::new(Hub::new(Arc::clone(&run))));
         if let Some(hub) = &hub {
@@ -119,6 +120,9 @@ impl Adaptor {
             Arc::clone(&log),
             Arc::clone(&clock),
         ));
+        if let (Some(stream), Some(file), true) = (&config.stream, &file, first) {
+            warn_of_readable_token(&run, stream, file);
+        }
         let forecaster = Arc::default();
         let server = match (&config.stream, &hub) {
             (Some(stream), Some(hub)) => {

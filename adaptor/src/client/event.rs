@@ -26,12 +26,16 @@ pub struct Received {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Event {
-    /// The facts of a run: sent first, and again when any of them changes.
+    /// The facts of a run: sent first, and again when any of them changes but the values of
+    /// parameters.
     Hello(Box<Hello>),
     /// How far the solver is. Of several that nobody has read the newest is kept.
     Status(Box<Status>),
     /// A change in the life of an order.
     Order(Box<OrderReport>),
+    /// The values of the parameters, one of which was set. Of several that nobody has read the newest
+    /// is kept.
+    Parameters(ParameterValues),
     /// A change of the stack of edits; [`Client::stack`](super::Client::stack) gets it.
     Stack(StackChange),
     /// How exact the frames of a view are from now on.
@@ -238,6 +242,13 @@ pub struct PipelinesChanged {
     pub cycle: Option<u64>,
 }
 
+/// The values that the parameters of the solver have now.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct ParameterValues {
+    /// By the names of the parameters.
+    pub values: BTreeMap<String, f64>,
+}
+
 /// A command that has taken effect.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Done {
@@ -323,6 +334,7 @@ impl Event {
             "hello" => read(value).map(Event::Hello),
             "status" => read(value).map(Event::Status),
             "order" => read(value).map(Event::Order),
+            "parameters" => read(value).map(Event::Parameters),
             "stack" => read(value).map(Event::Stack),
             "precision" => read(value).map(Event::Precision),
             "forecast" => read(value).map(Event::Forecast),

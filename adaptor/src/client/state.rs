@@ -166,6 +166,15 @@ impl State {
                 self.hello = Some(Arc::new((**hello).clone()));
                 self.texts.retain(|told| !matches!(told.event, Event::Hello(_)));
             }
+            Event::Parameters(told) => {
+                if let Some(hello) = &mut self.hello {
+                    for parameter in &mut Arc::make_mut(hello).parameters {
+                        let value = told.values.get(&parameter.name);
+                        parameter.value = value.copied().unwrap_or(parameter.value);
+                    }
+                }
+                self.texts.retain(|told| !matches!(told.event, Event::Parameters(_)));
+            }
             Event::Status(status) => {
                 self.status = Some(Arc::new((**status).clone()));
                 self.texts.retain(|told| !matches!(told.event, Event::Status(_)));

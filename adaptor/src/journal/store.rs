@@ -62,7 +62,13 @@ impl Store {
                 tracing::warn!(%path, "the journal {path} cannot be locked: {reason}");
             }
         }
-        let length = file.metadata().map_err(error)?.len();
+        let mut length = file.metadata().map_err(error)?.len();
+        if length > 0 && is_blank(&mut file).map_err(error)? {
+            let path = path.display();
+            tracing::warn!(%path, "the journal {path} held nothing but zeros, as after a loss of power, and begins anew");
+            file.set_len(0).map_err(error)?;
+            length = 0;
+        }
         // A device such as /dev/full has no length and cannot be cut.
         if length > 0 {
             if !is_journal(&beginning(&mut file, length).map_err(error)?) {
@@ -102,6 +108,19 @@ impl Append for Store {
 
     fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+/// Whether a file holds nothing but zeros: some file systems keep the length of what they have lost.
+fn is_blank(file: &mut File) -> io::Result<bool> {
+    let mut block = vec![0; BLOCK as usize];
+    file.seek(SeekFrom::Start(0))?;
+    loop {
+        match file.read(&mut block)? {
+            0 => return Ok(true),
+            count if block.iter().take(count).any(|&byte| byte != 0) => return Ok(false),
+            _ => {}
+        }
     }
 }
 
@@ -161,11 +180,29 @@ mod tests {
         Store::open(&path).unwrap();
     }
 
+    /// A loss of power leaves zeros where a file was made longer and its data had not come to the disk.
+    #[test]
+    fn zeros_are_what_a_loss_of_power_left() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("journal.jsonl");
+        let whole = "{\"end\":{\"cycle\":1,\"time\":0.1}}\n";
+        for (before, kept) in [("", 0), (whole, 1)] {
+            for zeros in [1, 4096, 200_000] {
+                std::fs::write(&path, format!("{before}{}", "\0".repeat(zeros))).unwrap();
+                let mut store = Store::open(&path).unwrap();
+                store.append(whole.as_bytes()).unwrap();
+                assert_eq!(std::fs::read_to_string(&path).unwrap(), whole.repeat(kept + 1));
+            }
+        }
+    }
+
     #[test]
     fn a_file_of_something_else_is_left_alone() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("results.csv");
-        for text in ["cycle,time\n1,0.1\n", "{\"version\": 1}", "half a line", "{\"run\": 3"] {
+        for text in
+            ["cycle,time\n1,0.1\n", "{\"version\": 1}", "half a line", "{\"run\": 3", "\0\0other"]
+        {
             std::fs::write(&path, text).unwrap();
             assert!(matches!(Store::open(&path), Err(JournalError::OtherFile { .. })), "{text}");
             assert_eq!(std::fs::read_to_string(&path).unwrap(), text);

@@ -7,8 +7,7 @@ use crate::{
     pipelines::{
         extract::{Association, Channel, Field, FieldView},
         files::read_mesh,
-        language::{Content, LanguageErrors, Trial, check_content, read_text},
-        limits::WAITING_BYTES,
+        language::{Content, LanguageErrors, Trial, check_content, read_orders_text},
         run::MeshTrial,
     },
 };
@@ -80,7 +79,7 @@ impl FromStr for Declared {
 
 pub(crate) fn check(options: &Options) -> Result<(), Failure> {
     let name = options.file.display().to_string();
-    let text = read_text(&options.file, WAITING_BYTES)?;
+    let text = read_orders_text(&options.file)?;
     let checked = match &options.mesh {
         None => check_content(&text, &name, None),
         Some(mesh) => {

@@ -10,7 +10,7 @@ use std::{
 };
 
 use tombolo_pipelines::{
-    language::{Command, Order},
+    language::{Command, Order, StreamLimits},
     limits::Exceeded,
 };
 
@@ -39,7 +39,7 @@ pub(crate) struct Asked {
 }
 
 /// The queue. To look whether anything happened costs the solver one atomic load.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Queue {
     attention: AtomicBool,
     /// Whether there has been a viewer that may steer.
@@ -52,7 +52,26 @@ pub(crate) struct Queue {
     arrived: Condvar,
 }
 
+impl Default for Queue {
+    fn default() -> Self {
+        Self::new(&StreamLimits::default())
+    }
+}
+
 impl Queue {
+    /// A queue with room for so much.
+    pub(crate) fn new(limits: &StreamLimits) -> Self {
+        Self {
+            attention: AtomicBool::default(),
+            driven: AtomicBool::default(),
+            waiting: Mutex::default(),
+            room: Arc::new(Room::new(limits)),
+            urgent: Arc::new(Room::new(&StreamLimits::default())),
+            questions: Mutex::default(),
+            arrived: Condvar::default(),
+        }
+    }
+
     /// Takes room for one more command, which came in so many bytes. It is given back when its turn
     /// has come.
     ///

@@ -6,8 +6,8 @@ use std::{
 };
 
 use tombolo_pipelines::{
-    language::Command,
-    limits::{Exceeded, PENDING, PENDING_BYTES},
+    language::{Command, StreamLimits},
+    limits::{Exceeded, Limit},
 };
 
 use crate::lock::lock;
@@ -21,8 +21,12 @@ pub(super) fn is_urgent(command: &Command) -> bool {
 }
 
 /// Room for so many commands, and so many bytes of them.
-#[derive(Debug, Default)]
-pub(crate) struct Room(Mutex<Taken>);
+#[derive(Debug)]
+pub(crate) struct Room {
+    taken: Mutex<Taken>,
+    commands: Limit,
+    bytes: Limit,
+}
 
 #[derive(Debug, Default)]
 struct Taken {
@@ -31,14 +35,19 @@ struct Taken {
 }
 
 impl Room {
+    pub(super) fn new(limits: &StreamLimits) -> Self {
+        let (commands, bytes) = (limits.pending(), limits.pending_bytes());
+        Self { taken: Mutex::default(), commands, bytes }
+    }
+
     /// Takes room for one more command, until the reservation is dropped.
     ///
     /// # Errors
     /// [`Exceeded`] where there is none.
     pub(crate) fn reserve(self: &Arc<Self>, bytes: usize) -> Result<Reservation, Exceeded> {
-        let mut taken = lock(&self.0);
-        PENDING.check(taken.commands + 1)?;
-        PENDING_BYTES.check(taken.bytes.saturating_add(bytes))?;
+        let mut taken = lock(&self.taken);
+        self.commands.check(taken.commands + 1)?;
+        self.bytes.check(taken.bytes.saturating_add(bytes))?;
         taken.commands += 1;
         taken.bytes += bytes;
         Ok(Reservation { room: Arc::clone(self), bytes, since: Instant::now() })
@@ -67,7 +76,7 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        let mut taken = lock(&self.room.0);
+        let mut taken = lock(&self.room.taken);
         taken.commands -= 1;
         taken.bytes -= self.bytes;
     }
@@ -75,11 +84,25 @@ impl Drop for Reservation {
 
 #[cfg(test)]
 mod tests {
+    use tombolo_pipelines::limits::{PENDING, PENDING_BYTES};
+
     use super::*;
 
     #[test]
+    fn as_much_waits_as_the_settings_say() {
+        let limits = serde_json::from_str(r#"{"waiting": 2, "waiting_megabytes": 1}"#).unwrap();
+        let room = Arc::new(Room::new(&limits));
+        let first = room.reserve(1).unwrap();
+        assert_eq!(room.reserve(1 << 20).unwrap_err().limit.most, 1 << 20);
+        let _second = room.reserve(1).unwrap();
+        assert_eq!(room.reserve(1).unwrap_err().limit.most, 2);
+        drop(first);
+        assert!(room.reserve(1).is_ok());
+    }
+
+    #[test]
     fn room_is_taken_until_it_is_given_back() {
-        let room = Arc::<Room>::default();
+        let room = Arc::new(Room::new(&StreamLimits::default()));
         let mut taken: Vec<_> = (0..PENDING.most).map(|_| room.reserve(1).unwrap()).collect();
         assert_eq!(room.reserve(1).unwrap_err(), PENDING.check(PENDING.most + 1).unwrap_err());
         taken.truncate(1);

@@ -2,17 +2,14 @@
 
 use std::time::Instant;
 
-/// Messages that may be sent at once.
-const BURST: f64 = 40.0;
-/// Messages a second that may be sent in the long run.
-const RATE: f64 = 20.0;
+use tombolo_pipelines::language::StreamLimits;
+
 /// Bytes of a message that count as one more.
 pub(super) const WEIGHT: usize = 1 << 20;
 
 /// A bucket that fills at a rate up to what may be said at once, and that each message takes one
-/// from, and one more for each [`WEIGHT`] of it. The one for the messages of viewers fills at
-/// [`RATE`] up to [`BURST`]; whoever shows the same secret or cookie shares one, so that a new
-/// connection is no way around it.
+/// from, and one more for each [`WEIGHT`] of it. Whoever shows the same secret or cookie shares one, so
+/// that a new connection is no way around it.
 #[derive(Debug)]
 pub(super) struct Allowance {
     burst: f64,
@@ -22,13 +19,12 @@ pub(super) struct Allowance {
     since: Instant,
 }
 
-impl Default for Allowance {
-    fn default() -> Self {
-        Self::new(BURST, RATE)
-    }
-}
-
 impl Allowance {
+    /// The one for the messages of viewers.
+    pub(super) fn of_messages(limits: &StreamLimits) -> Self {
+        Self::new(limits.messages_at_once.get().into(), limits.messages.get().into())
+    }
+
     pub(super) fn new(burst: f64, rate: f64) -> Self {
         Self { burst, rate, left: burst, since: Instant::now() }
     }
@@ -57,12 +53,12 @@ mod tests {
 
     #[test]
     fn a_flood_is_held_back() {
-        let mut allowance = Allowance::default();
+        let mut allowance = Allowance::of_messages(&StreamLimits::default());
         let begun = allowance.since;
         let taken = (0..1000).filter(|_| allowance.take(100)).count();
         // As many more as have come in since, on however busy a machine.
         let since = allowance.since.duration_since(begun).as_secs_f64();
-        assert!(taken >= 40 && taken as f64 <= 41.0 + RATE * since, "{taken} in {since} s");
+        assert!(taken >= 40 && taken as f64 <= 41.0 + 20.0 * since, "{taken} in {since} s");
     }
 
     #[test]
@@ -70,7 +66,7 @@ mod tests {
         let mut allowance = Allowance {
             left: 1.0,
             since: Instant::now() + Duration::from_secs(3600),
-            ..Allowance::default()
+            ..Allowance::new(40.0, 20.0)
         };
         assert!(allowance.take(100 * WEIGHT));
         assert!(!allowance.take(0) && allowance.left < -90.0);

@@ -19,6 +19,7 @@ use tokio::{
 use super::{
     credentials::Access,
     pool::{Guest, Pool},
+    refusals::Refused,
     socket::Accepted,
 };
 
@@ -114,6 +115,8 @@ pub(super) struct TimedStream {
     accepted: Accepted,
     connection: Connection,
     read_deadline: Pin<Box<Sleep>>,
+    /// Whether the client has sent something since it was answered last.
+    has_begun: bool,
     /// When a write that waits is given up, unless fewer bytes than these are untaken then.
     write_deadline: Option<(Pin<Box<Sleep>>, Option<i32>)>,
 }
@@ -124,11 +127,13 @@ impl TimedStream {
             accepted,
             connection,
             read_deadline: Box::pin(sleep_until(Instant::now() + UNKNOWN_TIME)),
+            has_begun: false,
             write_deadline: None,
         }
     }
 
     fn still_here(&mut self) {
+        self.has_begun = false;
         let guest = &self.connection.guest;
         let time = if guest.is_upgraded.load(Ordering::Relaxed) {
             SILENT_TIME
@@ -138,6 +143,16 @@ impl TimedStream {
             UNKNOWN_TIME
         };
         self.read_deadline.as_mut().reset(Instant::now() + time);
+    }
+
+    /// Tells that the connection ends in the midst of a request, where it does.
+    fn tell_slow(&self) {
+        let Connection { guest, pool, .. } = &self.connection;
+        if self.has_begun && !guest.is_upgraded.load(Ordering::Relaxed) {
+            let address = guest.address;
+            let what = || format!("a connection from {address} was closed");
+            pool.refusals.tell(address, Refused::Slow, None, what);
+        }
     }
 
     /// Makes a pending write fail once the client has taken no byte for [`WRITE_TIME`].
@@ -188,8 +203,10 @@ impl AsyncRead for TimedStream {
         if guest.is_cut.load(Ordering::Acquire) {
             return Poll::Ready(Err(timed_out("it makes way for a newer connection")));
         }
+        let before = buffer.filled().len();
         let read = Pin::new(&mut this.accepted.stream).poll_read(context, buffer);
         if read.is_ready() {
+            this.has_begun |= buffer.filled().len() > before;
             // Before the upgrade a byte now and then must not keep a connection open.
             if guest.is_upgraded.load(Ordering::Relaxed) {
                 this.still_here();
@@ -201,6 +218,7 @@ impl AsyncRead for TimedStream {
             // all.
             let waits = this.connection.guest.unanswered.load(Ordering::Acquire) > 0;
             if this.write_deadline.is_none() && !waits {
+                this.tell_slow();
                 return Poll::Ready(Err(timed_out("the client says nothing")));
             }
             this.still_here();

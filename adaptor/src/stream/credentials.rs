@@ -4,7 +4,7 @@
 use std::{
     cmp::Reverse,
     collections::VecDeque,
-    fs::{File, OpenOptions},
+    fs::{File, Metadata, OpenOptions},
     io::{Read, Write},
     net::IpAddr,
     path::Path,
@@ -13,7 +13,7 @@ use std::{
 
 use axum::http::{HeaderMap, Uri, header};
 use serde::{Deserialize, Serialize};
-use tombolo_pipelines::language::StreamServer;
+use tombolo_pipelines::language::{StreamLimits, StreamServer};
 
 use super::{StreamError, allowance::Allowance, secret::Secret};
 use crate::lock::lock;
@@ -29,8 +29,6 @@ const EXPECTED: &str = "expected a secret of 16 to 128 letters, digits, '-' or '
 /// ones make way.
 const KEYS: usize = 64;
 const KEYS_OF_VIEWER: usize = 8;
-/// Sessions that are known of each access; others make way.
-const SESSIONS: usize = 128;
 /// The longest file of secrets that is read, in bytes.
 const FILE: u64 = 4096;
 
@@ -63,8 +61,9 @@ pub(super) struct Holder {
 }
 
 impl Holder {
-    fn new(access: Access) -> Self {
-        Self { access, allowance: Arc::default(), in_use: Arc::default() }
+    fn new(access: Access, limits: &StreamLimits) -> Self {
+        let allowance = Arc::new(Mutex::new(Allowance::of_messages(limits)));
+        Self { access, allowance, in_use: Arc::default() }
     }
 }
 
@@ -110,6 +109,7 @@ pub(super) struct Credentials {
     issued: Mutex<Issued>,
     /// The name of the cookie, before its port.
     cookie: &'static str,
+    limits: StreamLimits,
 }
 
 /// A file of secrets.
@@ -196,17 +196,23 @@ impl Credentials {
                 "the secret for driving and the one for watching are the same".into(),
             ));
         }
-        Ok(Self::new(drive, watch, COOKIE))
+        Ok(Self::new(drive, watch, COOKIE, settings.limits))
     }
 
     /// Two secrets: of a run those for driving and for watching, of a relay that for runs and that for its
-    /// page. The last is what the names of cookies begin with.
-    pub(super) fn new(drive: Secret, watch: Secret, cookie: &'static str) -> Self {
+    /// page. The names of cookies begin with `cookie`.
+    pub(super) fn new(
+        drive: Secret,
+        watch: Secret,
+        cookie: &'static str,
+        limits: StreamLimits,
+    ) -> Self {
         Self {
-            drive: (drive, Holder::new(Access::Drive)),
-            watch: (watch, Holder::new(Access::Watch)),
+            drive: (drive, Holder::new(Access::Drive, &limits)),
+            watch: (watch, Holder::new(Access::Watch, &limits)),
             issued: Mutex::default(),
             cookie,
+            limits,
         }
     }
 
@@ -249,12 +255,12 @@ impl Credentials {
     ) -> Result<Secret, getrandom::Error> {
         let id = Secret::random()?;
         let sessions = &mut lock(&self.issued).sessions;
-        let mut holder = Holder::new(access);
+        let mut holder = Holder::new(access, &self.limits);
         let is_near = |it: &&Session| it.holder.access == access && it.address == address;
         if let (Access::Watch, Some(known)) = (access, sessions.iter().find(is_near)) {
             holder.allowance = Arc::clone(&known.holder.allowance);
         }
-        end_one(sessions, access);
+        end_one(sessions, access, self.limits.sessions.get() as usize);
         sessions.push_back(Session { id: id.clone(), holder, address });
         Ok(id)
     }
@@ -315,12 +321,12 @@ fn bearer_of(text: &str) -> Option<&str> {
     scheme.eq_ignore_ascii_case("bearer").then(|| secret.trim_start_matches(' '))
 }
 
-/// Ends a session where there are as many of this access as there may be: one that no connection uses,
+/// Ends a session where there are `most` of this access, as many as there may be: one that no connection uses,
 /// of the address that has the most, the oldest. So nobody who comes again and again ends those of others,
 /// and one who watches none of those who drive.
-fn end_one(sessions: &mut VecDeque<Session>, access: Access) {
+fn end_one(sessions: &mut VecDeque<Session>, access: Access, most: usize) {
     let alike = |session: &&Session| session.holder.access == access;
-    if sessions.iter().filter(alike).count() < SESSIONS {
+    if sessions.iter().filter(alike).count() < most {
         return;
     }
     let alike_from = |address: IpAddr| {
@@ -396,11 +402,35 @@ pub(super) fn open_private(path: &Path) -> Result<File, String> {
     if !metadata.is_file() {
         return Err(wrong("it is no file"));
     }
-    #[cfg(unix)]
-    if std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0 {
+    if is_open_to_others(&metadata) {
         return Err(wrong("others than its owner can get at it; `chmod 600` it"));
     }
     Ok(file)
+}
+
+/// Whether others than its owner can get at a file.
+#[cfg(unix)]
+fn is_open_to_others(metadata: &Metadata) -> bool {
+    std::os::unix::fs::PermissionsExt::mode(&metadata.permissions()) & 0o077 != 0
+}
+
+#[cfg(not(unix))]
+fn is_open_to_others(_: &Metadata) -> bool {
+    false
+}
+
+/// Warns of a secret in a configuration that others than its owner can read.
+pub(crate) fn warn_of_readable_token(run: &str, settings: &StreamServer, file: &Path) {
+    let is_open = || std::fs::metadata(file).is_ok_and(|metadata| is_open_to_others(&metadata));
+    if settings.token.is_some() && is_open() {
+        let path = file.display();
+        tracing::warn!(
+            run,
+            %path,
+            "others than its owner can get at {path}, and with `stream.token` in it at the run: `chmod 600` it, or give the \
+             secret in the file that `stream.secrets` names"
+        );
+    }
 }
 
 /// Reads a file of secrets.
@@ -421,8 +451,12 @@ mod tests {
 
     const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
 
+    const SESSIONS: usize = 60;
+
     fn credentials() -> Credentials {
-        Credentials::of(&StreamServer::default()).expect("secrets")
+        let settings = r#"{"limits": {"sessions": 60, "messages": 30, "messages_at_once": 25}}"#;
+        let settings: StreamServer = serde_json::from_str(settings).expect("settings");
+        Credentials::of(&settings).expect("secrets")
     }
 
     fn access(

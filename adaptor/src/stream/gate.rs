@@ -1,11 +1,6 @@
 //! What each request must pass: the name and the page that it comes by, and what it shows.
 
-use std::{
-    collections::HashMap,
-    net::IpAddr,
-    sync::{Arc, Mutex},
-    time::{Duration, Instant},
-};
+use std::sync::Arc;
 
 use axum::{
     extract::{ConnectInfo, Request, State},
@@ -18,15 +13,10 @@ use super::{
     Shared,
     connection::{Connection, Way},
     credentials::{Access, Credentials, Holder, Shown, parameter},
+    refusals::{Refusals, Refused},
     relay_messages::ACCESS,
 };
-use crate::lock::lock;
 use tombolo_pipelines::language::{Embedders, JournalNote, PageOrigin, RefusedRequest};
-
-/// How long nothing more is logged of an address once a refusal of it was.
-const QUIET: Duration = Duration::from_secs(60);
-/// Addresses whose refusals are remembered.
-const ADDRESSES: usize = 256;
 
 const UNAUTHORIZED: &str = "the token or cookie is missing, wrong or of another run; open the link that was printed when it began\n";
 const USED: &str = "this link opens one browser, once: it has been used, or is of another run. In the browser that it opened, \
@@ -65,7 +55,7 @@ impl Framing {
 /// Lets in to a server: under which names, and by which secrets.
 pub(super) struct Gate {
     pub(super) credentials: Arc<Credentials>,
-    pub(super) refusals: Refusals,
+    pub(super) refusals: Arc<Refusals>,
     /// Whether it listens on a loopback address.
     pub(super) is_loopback: bool,
     /// The host of the address that a proxy before it has, if one was named.
@@ -89,7 +79,7 @@ pub(super) async fn guard(
         None => next.run(request).await,
         Some(answer) => answer,
     };
-    if shared.gate.log_refusal(shared.hub.run(), &connection, &response) {
+    if shared.gate.log_refusal(&connection, &response) {
         let address = connection.address().to_string();
         shared.commands.note(JournalNote::Refused(RefusedRequest { address }));
     }
@@ -151,24 +141,16 @@ impl Gate {
             .map(|reason| (StatusCode::FORBIDDEN, reason).into_response())
     }
 
-    /// Logs a refusal of a run, or of a relay, once in a while for each address; whether it did.
-    pub(super) fn log_refusal(
-        &self,
-        run: Option<&str>,
-        connection: &Connection,
-        response: &Response,
-    ) -> bool {
-        let reason = match response.status() {
-            StatusCode::UNAUTHORIZED => "it showed no secret that is known here",
-            StatusCode::FORBIDDEN => "it came under a foreign name or from a page of another site",
+    /// Logs a refusal once in a while for each address; whether it did.
+    pub(super) fn log_refusal(&self, connection: &Connection, response: &Response) -> bool {
+        let refused = match response.status() {
+            StatusCode::UNAUTHORIZED => Refused::Secret,
+            StatusCode::FORBIDDEN => Refused::Foreign,
             _ => return false,
         };
         let address = connection.address();
-        let is_new = self.refusals.is_to_be_logged(address);
-        if is_new {
-            tracing::warn!(run, %address, reason, "a request from {address} was refused: {reason}");
-        }
-        is_new
+        let what = || format!("a request from {address} was refused");
+        self.refusals.tell(address, refused, None, what)
     }
 
     /// Answers a link of a browser with a cookie, and with the same page without what must stay secret.
@@ -273,23 +255,6 @@ pub(super) fn without_port(authority: &str) -> &str {
         .map_or(authority, |(name, port)| if port.ends_with(']') { authority } else { name })
 }
 
-/// Which addresses were refused of late.
-#[derive(Default)]
-pub(super) struct Refusals(Mutex<HashMap<IpAddr, Instant>>);
-
-impl Refusals {
-    /// Whether a refusal is the first of this address in a while.
-    pub(super) fn is_to_be_logged(&self, address: IpAddr) -> bool {
-        let mut logged = lock(&self.0);
-        logged.retain(|_, at| at.elapsed() < QUIET);
-        let is_new = !logged.contains_key(&address) && logged.len() < ADDRESSES;
-        if is_new {
-            logged.insert(address, Instant::now());
-        }
-        is_new
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -342,16 +307,5 @@ mod tests {
             let found = foreign(&Uri::from_static("/"), &headers, true, Some("portal.example"));
             assert_eq!(found.is_none(), is_well, "{host}");
         }
-    }
-
-    #[test]
-    fn refusals_are_logged_once_for_each_address() {
-        let refusals = Refusals::default();
-        let address = |last: u32| IpAddr::from((0x0a00_0000 + last).to_be_bytes());
-        assert!(refusals.is_to_be_logged(address(1)));
-        assert!(!refusals.is_to_be_logged(address(1)));
-        assert!(refusals.is_to_be_logged(address(2)));
-        let logged = (0..1000).filter(|&last| refusals.is_to_be_logged(address(last))).count();
-        assert!(logged < ADDRESSES);
     }
 }

@@ -195,6 +195,21 @@ impl Hub {
         state.greet();
     }
 
+    /// Replaces what `hello` tells about the run where nothing but the values of parameters has changed,
+    /// and has viewers told these alone.
+    pub(crate) fn describe_values(
+        &self,
+        description: impl Fn() -> Map<String, Value> + Send + Sync + 'static,
+        values: BTreeMap<String, f64>,
+    ) {
+        let text = Text::of(move || json!({"parameters": {"values": values}}));
+        let mut state = lock(&self.state);
+        state.description = Some(Arc::new(description));
+        state.clients.values().for_each(|client| client.parameters(&text));
+        // Whoever goes to a moment of a recording begins with the `hello` before it.
+        state.observer.iter().for_each(|observer| observer.greet());
+    }
+
     /// Replaces the stack of edits: so many, of which the first `kept` are those of before; so many
     /// orders can be taken back. `visit` calls back with the edits from one on, until it is told
     /// that it is enough.

@@ -3,7 +3,8 @@
 
 use std::{
     ffi::OsString,
-    io::{self, Write},
+    fs::File,
+    io::{self, Read, Write},
     net::SocketAddr,
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
@@ -32,40 +33,108 @@ pub(crate) fn told_in(line: &str) -> Option<&str> {
     told.filter(|path| !path.is_empty())
 }
 
-/// A file with links, which goes with the server that they lead to.
-pub(super) struct LinkFile(PathBuf);
+/// Bytes that are read of a file of links.
+const FILE: u64 = 1 << 16;
+/// What stands before the name of the machine in a file of links.
+const HOST: &str = "host: ";
+
+/// A file with links, which goes with the server that they lead to. It is locked until then, so that
+/// what a run that was killed has left can be told from it.
+pub(super) struct LinkFile {
+    path: PathBuf,
+    /// Holds the lock.
+    held: File,
+}
 
 impl LinkFile {
     pub(super) fn write(path: PathBuf, text: &str) -> io::Result<Self> {
-        write_whole(&path, text)?;
-        Ok(Self(path))
+        let held = write_whole(&path, text)?;
+        Ok(Self { path, held })
     }
 
     /// Writes the file again; whoever reads it meanwhile finds the old text or the new one.
-    fn rewrite(&self, text: &str) -> io::Result<()> {
-        write_whole(&self.0, text)
+    fn rewrite(&mut self, text: &str) -> io::Result<()> {
+        self.held = write_whole(&self.path, text)?;
+        Ok(())
     }
 }
 
-/// Writes a new file beside it and renames that, so that neither a link that lies there nor another's
-/// permissions count, and nobody finds half a file or none.
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+/// A file that is gone with this, unless it has got another name.
+struct Beside(PathBuf);
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Writes a new file beside it, locks it and renames it, so that neither a link that lies there nor
+/// another's permissions count, and nobody finds half a file, none, or one that seems to be nobody's.
+fn write_whole(path: &Path, text: &str) -> io::Result<File> {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
     name.push(".part");
-    let beside = LinkFile(path.with_file_name(name));
+    let beside = Beside(path.with_file_name(name));
     // What a run that was killed has left.
     match std::fs::remove_file(&beside.0) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}
     }
-    private().create_new(true).open(&beside.0)?.write_all(text.as_bytes())?;
-    std::fs::rename(&beside.0, path)
+    let mut file = private().create_new(true).open(&beside.0)?;
+    // Where a file system has no locks, nobody takes the file for one that was left.
+    let _ = file.try_lock();
+    file.write_all(text.as_bytes())?;
+    std::fs::rename(&beside.0, path)?;
+    Ok(file)
+}
+
+/// Removes what runs of this machine that were killed have left in a folder.
+fn remove_left(directory: &Path) {
+    let Ok(files) = std::fs::read_dir(directory) else { return };
+    for file in files.flatten() {
+        let name = file.file_name();
+        let is_one =
+            name.to_str().is_some_and(|it| it.starts_with("tombolo-") && it.ends_with(".link"));
+        let path = file.path();
+        if is_one && file.file_type().is_ok_and(|it| it.is_file()) && is_left(&path) {
+            let _ = std::fs::remove_file(&path);
+            let path = path.display();
+            tracing::info!(%path, "{path}, the links of a run that was killed, is removed");
+        }
+    }
+}
+
+/// Whether a file of links is one that a killed run has left: it is of this machine, and nobody holds
+/// it. Another machine's lock is not known everywhere.
+fn is_left(path: &Path) -> bool {
+    let Ok(file) = File::options().read(true).write(true).open(path) else { return false };
+    if file.try_lock().is_err() {
+        return false;
+    }
+    let mut text = String::new();
+    let is_read = Read::take(&file, FILE).read_to_string(&mut text).is_ok();
+    let host = text.lines().find_map(|line| line.strip_prefix(HOST));
+    // Another run may have put its own file there meanwhile.
+    is_read && host.is_some() && host == machine().as_deref() && is_at(&file, path)
+}
+
+/// Whether this file is the one at a path.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let number = |it: std::fs::Metadata| (it.dev(), it.ino());
+    let (here, there) = (file.metadata().map(number), std::fs::symlink_metadata(path).map(number));
+    matches!((here, there), (Ok(here), Ok(there)) if here == there)
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
 }
 
 impl Drop for LinkFile {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
+        let _ = std::fs::remove_file(&self.path);
     }
 }
 
@@ -131,7 +200,7 @@ impl Links {
         }
     }
 
-    /// The lines of the file: the links through a relay first, then those past it.
+    /// The lines of the file: the links through a relay first, then those past it, then the machine.
     fn lines(&self) -> String {
         let local = match (&self.relay, &self.place) {
             (Some(_), Some(place)) => Some(self.local(place)),
@@ -145,6 +214,7 @@ impl Links {
                 lines += &format!("{name}: {}\n", way.link("token", secret.as_str()));
             }
         }
+        lines.extend(machine().map(|host| format!("{HOST}{host}\n")));
         lines
     }
 
@@ -160,10 +230,12 @@ impl Links {
         }
     }
 
-    /// Writes the links of the run into a directory, and says how to open it. Only to a terminal is
+    /// Writes the links of the run into a directory, from which it removes those of killed ones, and says
+    /// how to open it. Only to a terminal is
     /// a link itself told: what is printed elsewhere others may read.
     pub(super) fn invitation(&self, directory: &Path, terminal: bool) -> io::Result<String> {
         std::fs::create_dir_all(directory)?;
+        remove_left(directory);
         let path = directory.join(format!("tombolo-{}.link", self.called()));
         self.write(path.clone())?;
         // Whoever reads it may stand elsewhere.
@@ -192,8 +264,8 @@ impl Links {
         let mut file = lock(&self.file);
         // Under the lock: a name that the relay gives meanwhile is written behind these.
         let lines = self.lines();
-        match &*file {
-            Some(there) if there.0 == path => there.rewrite(&lines)?,
+        match &mut *file {
+            Some(there) if there.path == path => there.rewrite(&lines)?,
             _ => {
                 // First the old one goes, which may be the same file by another name.
                 *file = None;
@@ -205,11 +277,10 @@ impl Links {
 
     /// Writes the file again, after the run has got another name at its relay.
     pub(super) fn renew(&self) {
-        let file = lock(&self.file);
-        if let Some(file) = &*file
+        if let Some(file) = &mut *lock(&self.file)
             && let Err(error) = file.rewrite(&self.lines())
         {
-            let path = file.0.display();
+            let path = file.path.display();
             tracing::warn!(%path, "the links were not written to {path}: {error}");
         }
     }
@@ -229,6 +300,22 @@ impl Way {
 /// The end of a link by which programs know a certificate. What stands behind the `#` no browser sends.
 pub(super) fn fragment(sha256: Option<&str>) -> String {
     sha256.map_or_else(String::new, |digits| format!("#sha256={digits}"))
+}
+
+/// Warns of a server that listens on every address of the machine: what is reachable then, and what its
+/// links name.
+pub(super) fn warn_of_open(run: Option<&str>, address: SocketAddr) {
+    if !address.ip().is_unspecified() {
+        return;
+    }
+    let named = authority(address);
+    tracing::warn!(
+        run,
+        %address,
+        "viewers are listened to on every address of this machine, from every network that it is in: whoever reaches {address} \
+         can connect, and needs a secret to see anything. The links lead to {named}, which may be known by that name to \
+         this machine alone; `stream.listen` takes one address"
+    );
 }
 
 /// The host and port at which a server is reached that listens on an address: the machine's name where
@@ -251,11 +338,35 @@ mod tests {
     use super::*;
 
     #[test]
+    fn only_the_links_of_a_killed_run_of_this_machine_are_removed() {
+        let directory = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| directory.path().join(name);
+        let Some(host) = machine() else { return };
+        let text = format!("drive: http://127.0.0.1:1/?token=d\n{HOST}{host}\n");
+        let mut living = LinkFile::write(at("tombolo-1.link"), &text).expect("written");
+        living.rewrite(&text).expect("written");
+        for name in ["tombolo-2.link", "notes-2.link", "tombolo-3.txt"] {
+            std::fs::write(at(name), &text).expect("written");
+        }
+        let of_other = text.replace(&host, "another-machine");
+        std::fs::write(at("tombolo-4.link"), of_other).expect("written");
+        std::fs::write(at("tombolo-5.link"), "drive: http://a/?token=d\n").expect("written");
+        std::fs::create_dir(at("tombolo-6.link")).expect("made");
+        remove_left(directory.path());
+        let files = std::fs::read_dir(directory.path()).expect("the folder").flatten();
+        let mut names: Vec<_> = files.map(|file| file.file_name()).collect();
+        names.sort();
+        let expected = ["notes-2.link", "tombolo-1.link", "tombolo-3.txt", "tombolo-4.link"];
+        assert_eq!(names[..4], expected);
+        assert_eq!(names[4..], ["tombolo-5.link", "tombolo-6.link"]);
+    }
+
+    #[test]
     fn a_file_of_links_is_whole_whenever_it_is_read() {
         let directory = tempfile::tempdir().expect("a folder");
         let path = directory.path().join("tombolo-run.link");
         let text = |address: &str| format!("drive: {address}\nwatch: {address}\n");
-        let file = LinkFile::write(path.clone(), &text("http://before/")).expect("written");
+        let mut file = LinkFile::write(path.clone(), &text("http://before/")).expect("written");
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let reader = scope.spawn(|| {

@@ -6,10 +6,12 @@ use std::{io, sync::Arc, time::Duration};
 use axum::{extract::connect_info::Connected, serve::IncomingStream};
 use tokio::{sync::mpsc, task::JoinSet};
 use tokio_rustls::TlsAcceptor;
+use tombolo_pipelines::language::StreamLimits;
 
 use super::{
     connection::{Connection, TimedStream, Way},
     pool::Pool,
+    refusals::Refusals,
     socket::{Accepted, Listening},
 };
 use crate::dial::Stream;
@@ -34,15 +36,17 @@ pub(super) struct Entrance {
 }
 
 impl Listener {
-    /// Takes connections from a socket, if there is one, of which `most` at once may have shown a secret; with
-    /// an acceptor all are encrypted. The entrance is for those that come otherwise.
+    /// Takes connections from a socket, if there is one, of which so many may be open; with an acceptor all are
+    /// encrypted. The entrance is for those that come otherwise.
     pub(super) fn new(
         socket: Option<Listening>,
         acceptor: Option<TlsAcceptor>,
-        most: usize,
+        limits: &StreamLimits,
+        refusals: &Arc<Refusals>,
     ) -> (Self, Entrance) {
         let (sender, ready) = mpsc::channel(READY);
-        let entrance = Entrance { pool: Arc::new(Pool::new(most)), ready: sender };
+        let pool = Arc::new(Pool::new(limits, Arc::clone(refusals)));
+        let entrance = Entrance { pool, ready: sender };
         let mut accepting = JoinSet::new();
         if let Some(socket) = socket {
             accepting.spawn(accept(socket, acceptor, entrance.clone()));

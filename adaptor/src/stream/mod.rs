@@ -37,6 +37,7 @@ mod pace;
 mod people;
 mod playback;
 mod pool;
+mod refusals;
 pub mod relay;
 mod relay_messages;
 mod routes;
@@ -77,10 +78,12 @@ pub(crate) use surface::ReferenceSurface;
 
 use connect::Connect;
 use connection::Connection;
+pub(crate) use credentials::warn_of_readable_token;
 use credentials::{Access, Credentials};
-use gate::{Framing, Gate, Refusals};
+use gate::{Framing, Gate};
 use links::Links;
 use listener::Listener;
+use refusals::Refusals;
 use socket::{Listening, Place, Socket};
 use tls::Identity;
 use tokio_rustls::TlsAcceptor;
@@ -239,6 +242,9 @@ impl Server {
             })
         };
         let (socket, place) = settings.place().map(bind).transpose()?.unzip();
+        if let Some(Place::Address(address)) = &place {
+            links::warn_of_open(hub.run(), *address);
+        }
         let identity = match &place {
             Some(place) => Identity::of_server(settings, place)?,
             None => None,
@@ -249,7 +255,7 @@ impl Server {
         hub.set_driver_silence(Duration::from_secs(settings.limits.driver_silence.get().into()));
         let gate = Gate {
             credentials: Arc::clone(&credentials),
-            refusals: Refusals::default(),
+            refusals: Arc::new(Refusals::of_run(hub.run())),
             is_loopback,
             public: None,
             is_encrypted: identity.is_some(),
@@ -388,8 +394,8 @@ async fn serve(
 ) {
     let hub = Arc::clone(&shared.hub);
     let commands = Arc::clone(&shared.commands);
-    let most = shared.limits.connections.get() as usize;
-    let (listener, entrance) = Listener::new(listening, ways.acceptor.clone(), most);
+    let (listener, entrance) =
+        Listener::new(listening, ways.acceptor.clone(), &shared.limits, &shared.gate.refusals);
     let router = routes::router(shared).into_make_service_with_connect_info::<Connection>();
     let connecting = async {
         match &ways.relay {

@@ -127,6 +127,8 @@ struct Outbox {
     texts: VecDeque<Text>,
     monitors: VecDeque<Text>,
     stack: Option<StackChange>,
+    /// The newest values of parameters.
+    parameters: Option<Text>,
     status: Option<Text>,
     /// The newest camera of the one that drives.
     camera: Option<Text>,
@@ -262,6 +264,10 @@ impl Client {
         if !outbox.has_been_greeted && !outbox.has_ended {
             return Ok(None);
         }
+        // Whoever hears that a parameter was set finds its value changed.
+        if let Some(text) = outbox.parameters.take() {
+            return Ok(Some(Message::Text(text)));
+        }
         if let Some(text) = outbox.texts.pop_front() {
             return Ok(Some(Message::Text(text)));
         }
@@ -312,6 +318,11 @@ impl Client {
     /// Has a change of the stack told, with those that were not told yet.
     pub(super) fn stack(&self, change: StackChange) {
         self.tell(|outbox| outbox.stack = Some(change.after(outbox.stack)));
+    }
+
+    /// Puts values of parameters in the place of the last ones.
+    pub(super) fn parameters(&self, text: &Text) {
+        self.tell(|outbox| outbox.parameters = Some(text.clone()));
     }
 
     /// Puts a status in the place of the last one.

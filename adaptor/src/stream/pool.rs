@@ -9,15 +9,14 @@ use std::{
 };
 
 use futures_util::task::AtomicWaker;
+use tombolo_pipelines::language::StreamLimits;
 
-use super::credentials::Access;
+use super::{
+    credentials::Access,
+    refusals::{Refusals, Refused},
+};
 use crate::lock::lock;
 
-/// Connections open at once that have shown no secret. Beyond it the oldest makes way.
-const UNKNOWN: usize = 64;
-/// Of these, from one address that is not this machine's: behind the loopback address there may be
-/// everybody's tunnels.
-const UNKNOWN_OF_ADDRESS: usize = 8;
 /// Connections beyond the limit for those who may drive.
 const RESERVED: usize = 8;
 
@@ -48,7 +47,12 @@ impl Guest {
 #[derive(Debug)]
 pub(super) struct Pool {
     open: Mutex<Open>,
+    /// Connections at once that may have shown a secret.
     most: usize,
+    /// Those that may have shown none, and of these from one address that is not this machine's.
+    unknown: usize,
+    unknown_of_address: usize,
+    pub(super) refusals: Arc<Refusals>,
 }
 
 #[derive(Debug, Default)]
@@ -59,9 +63,14 @@ struct Open {
 }
 
 impl Pool {
-    /// `most` connections at once may have shown a secret.
-    pub(super) fn new(most: usize) -> Self {
-        Self { open: Mutex::default(), most }
+    pub(super) fn new(limits: &StreamLimits, refusals: Arc<Refusals>) -> Self {
+        Self {
+            open: Mutex::default(),
+            most: limits.connections.get() as usize,
+            unknown: limits.unknown_connections.get() as usize,
+            unknown_of_address: limits.unknown_connections_of_address.get() as usize,
+            refusals,
+        }
     }
 
     /// Takes in a connection; where there are too many like it, the oldest makes way. A flood of
@@ -78,16 +87,21 @@ impl Pool {
         let mut open = lock(&self.open);
         let of_address = |guest: &Arc<Guest>| guest.address == address;
         let count = open.unknown.iter().filter(|guest| of_address(guest)).count();
-        let is_much = count >= UNKNOWN_OF_ADDRESS && !address.is_loopback();
+        let is_much = count >= self.unknown_of_address && !address.is_loopback();
         let oldest = if is_much {
             open.unknown.iter().position(of_address)
         } else {
-            (open.unknown.len() >= UNKNOWN).then_some(0)
+            (open.unknown.len() >= self.unknown).then_some(0)
         };
         if let Some(oldest) = oldest {
             open.unknown.remove(oldest).cut();
         }
         open.unknown.push(Arc::clone(&guest));
+        drop(open);
+        if oldest.is_some() {
+            let what = || format!("a connection from {address} has ended an older one");
+            self.refusals.tell(address, Refused::Crowd, None, what);
+        }
         guest
     }
 
@@ -122,7 +136,9 @@ mod tests {
     use super::*;
 
     fn pool() -> Pool {
-        Pool::new(2)
+        let limits =
+            r#"{"connections": 2, "unknown_connections": 50, "unknown_connections_of_address": 5}"#;
+        Pool::new(&serde_json::from_str(limits).expect("limits"), Arc::default())
     }
 
     fn address(last: u8) -> IpAddr {
@@ -136,12 +152,12 @@ mod tests {
         let flood: Vec<_> = (0..200).map(|_| pool.enter(address(2))).collect();
         let cut = |guest: &Guest| guest.is_cut.load(Ordering::Relaxed);
         assert!(!cut(&other));
-        assert_eq!(flood.iter().filter(|guest| !cut(guest)).count(), UNKNOWN_OF_ADDRESS);
+        assert_eq!(flood.iter().filter(|guest| !cut(guest)).count(), 5);
         assert!(!cut(&flood[199]));
         // Behind the loopback address there may be anybody.
         let local: Vec<_> = (0..200).map(|_| pool.enter([127, 0, 0, 1].into())).collect();
         assert!(cut(&other));
-        assert_eq!(local.iter().filter(|guest| !cut(guest)).count(), UNKNOWN);
+        assert_eq!(local.iter().filter(|guest| !cut(guest)).count(), 50);
         flood.iter().chain(&local).for_each(|guest| pool.leave(guest));
         assert!(lock(&pool.open).unknown.is_empty());
     }

@@ -11,6 +11,7 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use serde_json::json;
+use tokio_tungstenite::tungstenite;
 use tombolo_pipelines::language::{
     JournalNote, LinkFor, Message as Said, Together, ViewerMove, ViewerNote, Wheel, parse_message,
 };
@@ -19,8 +20,10 @@ use tracing::info;
 use super::{
     CommandSink, PING_PERIOD, Shared,
     credentials::{Access, Credentials, Holder},
+    gate::Gate,
     hub::Hub,
     outbox::{Client, Message},
+    refusals::Refused,
     text::Text,
     viewer_lines::ViewerLines,
 };
@@ -50,7 +53,7 @@ pub(super) async fn serve(
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
         () = write(sink, &client, &hub, &*commands) => {}
-        () = read(stream, &seat, &holder, &gate.credentials) => {}
+        () = read(stream, &seat, &holder, &gate) => {}
     }
 }
 
@@ -157,14 +160,25 @@ async fn write(
     }
 }
 
-async fn read(
-    mut stream: SplitStream<WebSocket>,
-    seat: &Seat<'_>,
-    holder: &Holder,
-    credentials: &Credentials,
-) {
+async fn read(mut stream: SplitStream<WebSocket>, seat: &Seat<'_>, holder: &Holder, gate: &Gate) {
     let client = seat.client;
-    while let Some(Ok(message)) = stream.next().await {
+    let refused = |refused, what: &dyn Fn(&str) -> String| {
+        let (viewer, address) = (Hub::name(client.id), seat.address);
+        let who = format!("the viewer {viewer} from {address}");
+        gate.refusals.tell(address, refused, Some(&viewer), || what(&who));
+    };
+    while let Some(message) = stream.next().await {
+        let message = match message {
+            Err(error) => {
+                if is_too_long(error) {
+                    refused(Refused::Long, &|who| {
+                        format!("a message of {who} ended its connection")
+                    });
+                }
+                return;
+            }
+            Ok(message) => message,
+        };
         let message = match message {
             Wire::Close(close) => {
                 // A program that is done says nothing or 1000. A page that is left or loaded again
@@ -181,10 +195,11 @@ async fn read(
         };
         // Waiting here leaves the rest in the viewer's own socket.
         while !lock(&holder.allowance).take(bytes(&message)) {
+            refused(Refused::Flood, &|who| format!("messages of {who} are held back"));
             tokio::time::sleep(HELD_BACK).await;
         }
         let answer = match message {
-            Wire::Text(text) => receive(&text, seat, credentials),
+            Wire::Text(text) => receive(&text, seat, &gate.credentials, &refused),
             _ => Err((
                 None,
                 "a binary message that is not the number of frames decoded, 8 bytes, more than \
@@ -198,6 +213,12 @@ async fn read(
     }
 }
 
+/// Whether a connection ends for a message that is longer than any that is read.
+fn is_too_long(error: axum::Error) -> bool {
+    let error = error.into_inner().downcast::<tungstenite::Error>();
+    error.is_ok_and(|error| matches!(*error, tungstenite::Error::Capacity(_)))
+}
+
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
 /// "forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
 /// "note" | "remove_note": ...}`.
@@ -205,6 +226,7 @@ fn receive(
     text: &str,
     seat: &Seat<'_>,
     credentials: &Credentials,
+    refused: &dyn Fn(Refused, &dyn Fn(&str) -> String),
 ) -> Result<(), (Option<String>, String)> {
     let Seat { client, hub, commands, .. } = *seat;
     let drives = hub.is_driver(client.id);
@@ -217,6 +239,8 @@ fn receive(
     };
     // A viewer that watches can send a `drive` or a note; a longer message is not worth reading.
     if !drives && text.len() > most {
+        let bytes = text.len();
+        refused(Refused::Long, &|who| format!("a message of {who} of {bytes} bytes was not read"));
         return Err((None, watches.into()));
     }
     let (id, message) = parse_message(text);
@@ -228,13 +252,29 @@ fn receive(
         Ok(Said::Wheel(Wheel::Here {})) => Ok(()),
         Ok(Said::Wheel(Wheel::Drive {})) if client.access == Access::Drive => hub.drive(client.id),
         Ok(Said::Together(together)) => take(together, id.clone(), seat, credentials),
-        _ if !drives => Err(watches.into()),
+        message if !drives => {
+            let asked = message.as_ref().map_or("what nobody understands", asked_for);
+            refused(Refused::Command, &|who| format!("{who} asked for {asked} in vain"));
+            Err(watches.into())
+        }
         Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
         Ok(Said::Wheel(Wheel::Kick { client: other })) => hub.kick(client.id, &other),
         Ok(message) => commands.receive(client.id, id.clone(), message, text),
         Err(error) => Err(error.to_string()),
     };
     answered.map_err(|reason| (id, reason))
+}
+
+/// The key by which JSON knows a message that none but the driver may send.
+fn asked_for(message: &Said) -> &'static str {
+    match message {
+        Said::Command(command) => command.name(),
+        Said::Question(_) => "forecast",
+        Said::Wheel(Wheel::HandOver { .. }) => "hand_over",
+        Said::Wheel(Wheel::Kick { .. }) => "kick",
+        Said::Wheel(Wheel::Drive {} | Wheel::Here {}) => "drive",
+        Said::Together(_) => "what is free to all",
+    }
 }
 
 /// Takes a message about the viewers themselves; the error says why it comes to nothing.

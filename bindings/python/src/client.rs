@@ -160,6 +160,7 @@ impl Client {
             Event::Hello(_) => "hello",
             Event::Status(_) => "status",
             Event::Order(_) => "order",
+            Event::Parameters(_) => "parameters",
             Event::Stack(_) => "stack",
             Event::Precision(_) => "precision",
             Event::Monitor(_) => "monitor",

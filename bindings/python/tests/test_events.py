@@ -80,6 +80,17 @@ def test_the_end_ends_every_wait(solver, run):
     assert run.monitors["health"].rows
 
 
+def test_values_of_parameters_are_those_told_last():
+    state = State()
+    bounds = {"minimum": 0, "maximum": 20}
+    state.take("hello", {"hello": {"client": "c1", "parameters": [{"name": "inflow", "value": 10, **bounds}]}})
+    before = state.hello
+    event = state.take("parameters", {"parameters": {"values": {"inflow": 12, "unheard": 3}}})
+    assert (event.kind, event.data) == ("parameters", {"values": {"inflow": 12, "unheard": 3}})
+    assert state.hello == {"client": "c1", "parameters": [{"name": "inflow", "value": 12, **bounds}]}
+    assert before["parameters"][0]["value"] == 10
+
+
 def test_a_message_of_another_form_is_an_event_and_no_end():
     state = State()
     assert state.take("unknown", {"status": {"cycle": -1}}) == ("status", {"cycle": -1})

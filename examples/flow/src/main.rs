@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use tombolo::Stopper;
 use tombolo::communicator::{Communicator, Solo};
@@ -15,7 +15,7 @@ use tombolo::deform::linear::{BuiltIn, Solvers};
 use tombolo::pipelines::language::Listen;
 use tombolo_flow::Settings;
 use tombolo_flow::parts::{Dealing, Ranks};
-use tombolo_flow::program::{Options, Run};
+use tombolo_flow::program::{Options, Run, tell};
 use tombolo_flow::ranks::{agreed, threads};
 use tombolo_flow::report::{empty_file, make_file};
 
@@ -91,27 +91,39 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             if !error.is_empty() {
-                eprintln!("flow: {error}");
+                tell(format_args!("{error}"));
             }
             ExitCode::FAILURE
         }
     }
 }
 
-/// Has the run stop, and say what it came to, when the process is asked to end. Who asks twice is
-/// obeyed at once.
+/// Has the run stop, and say what it came to, when the process is asked to end, or its terminal is
+/// gone. Who asks twice is obeyed at once; a terminal may say that it is gone more than once.
 fn stop_on_signals(stopper: Stopper) -> std::io::Result<()> {
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    if !outlives_terminal() {
+        signals.add_signal(SIGHUP)?;
+    }
     std::thread::Builder::new().name("signals".into()).spawn(move || {
         let mut has_asked = false;
         for signal in signals.forever() {
-            if std::mem::replace(&mut has_asked, true) {
+            if signal != SIGHUP && std::mem::replace(&mut has_asked, true) {
                 let _ = signal_hook::low_level::emulate_default_handler(signal);
             }
             stopper.stop();
         }
     })?;
     Ok(())
+}
+
+/// Whether this process was started to go on without its terminal, as by `nohup`; where the system does
+/// not say, it is left as it is.
+fn outlives_terminal() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.is_none_or(|mask| mask & (1 << (SIGHUP - 1)) != 0)
 }
 
 /// Whether this process was started by mpirun, together with others or alone.
@@ -146,7 +158,7 @@ fn on_ranks(
     work(ranks, solvers).map_err(|error| {
         // Before MPI is finalized: once a rank has failed and gone, mpirun ends the others.
         if is_first {
-            eprintln!("flow: {error}");
+            tell(format_args!("{error}"));
         }
         String::new()
     })

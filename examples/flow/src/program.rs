@@ -1,5 +1,6 @@
 //! The program `flow`: a case, steered through the adaptor.
 
+use std::io::Write;
 use std::mem::replace;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,11 @@ use crate::ranks::agreed;
 use crate::report::{FlowReport, MeshReport, Report, Unwritten};
 use crate::saved::{self, State};
 use crate::solver::{Motion, Settings as SolverSettings, Solver};
+
+/// Tells something of a run. Whoever has closed the terminal or file that it goes to wants to hear nothing.
+pub fn tell(what: std::fmt::Arguments<'_>) {
+    drop(writeln!(std::io::stderr(), "flow: {what}"));
+}
 
 /// By which part of its volume a fluid may be stretched before that is told.
 const STRETCH: f64 = 1e-6;
@@ -252,9 +258,9 @@ impl Run {
         let adaptor = match self.adaptor.finalize() {
             Ok(report) => report,
             Err(FinalizeError::Files { report, first, count }) => {
-                eprintln!(
-                    "flow: {count} file(s) of the pipelines could not be written; the first: {first}"
-                );
+                tell(format_args!(
+                    "{count} file(s) of the pipelines could not be written; the first: {first}"
+                ));
                 *report
             }
             Err(error) => return Err(error.into()),
@@ -302,10 +308,10 @@ impl Run {
                 if let Err(error) = changed
                     && self.communicator.rank() == 0
                 {
-                    eprintln!(
-                        "flow: cycle {}: {error}; the flow goes on with the parameters before",
+                    tell(format_args!(
+                        "cycle {}: {error}; the flow goes on with the parameters before",
                         step.cycle
-                    );
+                    ));
                 }
             }
             let coordinates = steering.motion.map(|motion| motion.coordinates);
@@ -329,10 +335,10 @@ impl Run {
             let tells =
                 self.flow.stretch.abs() > STRETCH && !replace(&mut self.has_told_stretch, true);
             if tells && self.communicator.rank() == 0 {
-                eprintln!(
-                    "flow: cycle {}: the domain has no outlet, but its volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
+                tell(format_args!(
+                    "cycle {}: the domain has no outlet, but its volume changes: the fluid is stretched by {:e} of it; an outlet would let it pass",
                     step.cycle, self.flow.stretch
-                );
+                ));
             }
             if self.has_history {
                 let (cycle, time, through) =
@@ -368,7 +374,7 @@ impl Run {
         if let Some(told) = self.unwritten.note(what, self.solver.cycle(), written)
             && self.communicator.rank() == 0
         {
-            eprintln!("flow: {told}; the run goes on");
+            tell(format_args!("{told}; the run goes on"));
         }
     }
 

@@ -10,11 +10,13 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::Problem;
 use super::pipeline::{Due, Pipeline};
 use super::{
     page_origin::Embedders,
     relay_address::{RelayAddress, RunName},
 };
+use crate::limits::{Limit, PENDING, PENDING_BYTES};
 
 /// A whole configuration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -134,7 +136,7 @@ pub struct StreamServer {
     #[serde(skip_serializing_if = "Embedders::is_empty")]
     #[schemars(with = "Vec<String>")]
     pub embed: Embedders,
-    /// How many may connect, and how long a driver may be silent.
+    /// How many may connect, what they may send, and how long a driver may be silent.
     pub limits: StreamLimits,
 }
 
@@ -216,7 +218,7 @@ pub struct Tls {
     pub key: Option<String>,
 }
 
-/// How many may connect, and how long a driver may be silent.
+/// How many may connect, what they may send, and how long a driver may be silent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StreamLimits {
@@ -227,6 +229,69 @@ pub struct StreamLimits {
     /// Seconds after which another may take the wheel from a driver who gives no command and sends
     /// no sign of being there.
     pub driver_silence: NonZeroU32,
+    /// Messages a second, in the long run, of all who show the same secret or cookie, and of all who
+    /// watch with cookies from one address. Each 2^20 bytes of a message count as one more. What is
+    /// beyond it waits in the client's own socket.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub messages: NonZeroU32,
+    /// Messages that they may send at once, after a silence.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub messages_at_once: NonZeroU32,
+    /// Connections at once of those who have shown no secret yet. For one more the oldest makes way.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub unknown_connections: NonZeroU32,
+    /// Of these, from one address that is not this machine's: behind the loopback address there may be
+    /// everybody's tunnels.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub unknown_connections_of_address: NonZeroU32,
+    /// Browsers that are known by their cookies, of those who may drive and of those who watch each. For
+    /// one more, one that no connection uses is forgotten.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub sessions: NonZeroU32,
+    /// Orders and other commands of viewers that wait for their turn. One more is refused; pauses, stops
+    /// and cancels have room of their own.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub waiting: NonZeroU32,
+    /// The most that these may have, in units of 2^20 bytes.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub waiting_megabytes: NonZeroU32,
+}
+
+impl StreamLimits {
+    /// The most of each that is counted by the server itself: far beyond what is meant.
+    const MOST: u32 = 10_000;
+
+    /// The most commands of viewers that wait.
+    #[must_use]
+    pub fn pending(&self) -> Limit {
+        let most = usize::try_from(self.waiting.get()).unwrap_or(usize::MAX);
+        Limit { most, ..PENDING }
+    }
+
+    /// The most bytes of the commands of viewers that wait.
+    #[must_use]
+    pub fn pending_bytes(&self) -> Limit {
+        let megabytes = usize::try_from(self.waiting_megabytes.get()).unwrap_or(usize::MAX);
+        Limit { most: megabytes.saturating_mul(1 << 20), ..PENDING_BYTES }
+    }
+
+    /// What is beyond its range.
+    pub(super) fn problems(&self) -> impl Iterator<Item = Problem> {
+        let found = [
+            ("messages", self.messages),
+            ("messages_at_once", self.messages_at_once),
+            ("unknown_connections", self.unknown_connections),
+            ("unknown_connections_of_address", self.unknown_connections_of_address),
+            ("sessions", self.sessions),
+            ("waiting", self.waiting),
+            ("waiting_megabytes", self.waiting_megabytes),
+        ];
+        let beyond = found.into_iter().filter(|(_, number)| number.get() > Self::MOST);
+        beyond.map(|(key, number)| {
+            let message = format!("found {number}, expected 1 to {}", Self::MOST);
+            Problem::new(message).within(key)
+        })
+    }
 }
 
 impl Default for StreamLimits {
@@ -237,7 +302,18 @@ impl Default for StreamLimits {
                 None => NonZeroU32::MIN,
             }
         }
-        Self { viewers: number(64), connections: number(256), driver_silence: number(60) }
+        Self {
+            viewers: number(64),
+            connections: number(256),
+            driver_silence: number(60),
+            messages: number(20),
+            messages_at_once: number(40),
+            unknown_connections: number(64),
+            unknown_connections_of_address: number(8),
+            sessions: number(128),
+            waiting: number(256),
+            waiting_megabytes: number(64),
+        }
     }
 }
 

@@ -36,7 +36,7 @@ pub enum JournalNote {
     Note(PinnedNote),
     /// A note was taken away.
     NoteRemoved(UnpinnedNote),
-    /// The state of the run was saved, so that another one can go on from here.
+    /// A checkpoint was made here, from which another run can go on where it was then saved.
     Checkpoint(CheckpointNote),
     /// The run came to its end.
     End(RunEnd),
@@ -75,7 +75,7 @@ pub struct RestartedFrom {
     pub cycle: u64,
 }
 
-/// A checkpoint, made after the lines above it.
+/// A checkpoint, made after the lines above it. Whether it was then saved the journal does not know.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointNote {

@@ -6,10 +6,11 @@ use std::io::BufRead;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{HandedShape, JournalNote, RestartedFrom, UnpinnedNote};
+use super::journal_file::RUN_LINE;
 use super::order::Command;
 use super::timed::{CommandAuthor, JournalEntry, OrderStatus};
 use super::together::{PinnedNote, pin};
-use crate::limits::{Exceeded, WAITING, WAITING_BYTES};
+use crate::limits::{DOCUMENT, Exceeded, WAITING};
 
 /// What a run did after its checkpoint, as far as its journal holds it: all that whoever goes on from
 /// there would not do by himself.
@@ -92,17 +93,19 @@ impl Since {
     /// # Errors
     /// [`SinceError`], which names the line.
     pub fn read(mut journal: impl BufRead, from: &RestartedFrom) -> Result<Self, SinceError> {
-        let most = WAITING_BYTES.most as u64;
         let (mut number, mut line) = (0, Vec::new());
         let mut reader = Reader::default();
         loop {
             line.clear();
+            let most = DOCUMENT.most as u64 + 1;
             let read = std::io::Read::take(&mut journal, most).read_until(b'\n', &mut line)?;
             number += 1;
+            let wrong = |message: String| SinceError::Line { line: number, message };
+            DOCUMENT.check(read).map_err(|exceeded| wrong(exceeded.to_string()))?;
             if read == 0 || line.last() != Some(&b'\n') {
                 break;
             }
-            if line.starts_with(b"{\"run\":") {
+            if line.starts_with(RUN_LINE) {
                 reader.begin(serde_json::from_slice(&line).ok(), from);
                 continue;
             }
@@ -111,10 +114,7 @@ impl Since {
             }
             let entry = serde_json::from_slice(&line);
             reader.add(
-                entry.map_err(|error: serde_json::Error| SinceError::Line {
-                    line: number,
-                    message: error.to_string(),
-                })?,
+                entry.map_err(|error: serde_json::Error| wrong(error.to_string()))?,
                 &from.checkpoint,
             )?;
         }

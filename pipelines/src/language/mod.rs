@@ -34,6 +34,7 @@ mod file_pattern;
 mod file_series;
 mod glyphs;
 mod journal;
+mod journal_file;
 mod journal_since;
 mod kind;
 mod mend;
@@ -83,6 +84,7 @@ pub use journal::{
     CheckpointNote, HandedShape, JournalNote, LostLines, Recording, RefusedRequest, RestartedFrom,
     RunEnd, RunHeader, UnpinnedNote, ViewerMove, ViewerNote, is_journal, parse_journal,
 };
+pub use journal_file::read_orders_text;
 pub use journal_since::{Outcome, Since, SinceError, Taken};
 pub use message::{Message, Wheel, parse_message};
 pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};

@@ -26,6 +26,9 @@ pub struct Order {
     /// The id of an order that has not begun to move the mesh, whose place this one takes: that one is
     /// rejected at the same safe point. Where it has begun, this one is rejected.
     pub replaces: Option<String>,
+    /// Seconds that the order of a viewer may wait for its turn, where that is less than the
+    /// configuration's `steering.deadline`.
+    pub deadline: Option<NonZeroU32>,
 }
 
 /// A change of the stack of edits.
@@ -68,7 +71,7 @@ impl Order {
 impl From<Change> for Order {
     /// The change with the configuration's settings.
     fn from(change: Change) -> Self {
-        Self { change, schedule: None, deform: None, guard: None, replaces: None }
+        Self { change, schedule: None, deform: None, guard: None, replaces: None, deadline: None }
     }
 }
 
@@ -99,6 +102,10 @@ struct OrderFields {
     /// rejected at the same safe point. Where it has begun, this one is rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     replaces: Option<String>,
+    /// Seconds that the order of a viewer may wait for its turn, from when it came in, where that is less
+    /// than `steering.deadline`. It is rejected then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    deadline: Option<NonZeroU32>,
 }
 
 impl TryFrom<OrderFields> for Order {
@@ -121,15 +128,15 @@ impl TryFrom<OrderFields> for Order {
                 );
             }
         };
-        let OrderFields { schedule, deform, guard, replaces, .. } = fields;
-        Ok(Self { change, schedule, deform, guard, replaces })
+        let OrderFields { schedule, deform, guard, replaces, deadline, .. } = fields;
+        Ok(Self { change, schedule, deform, guard, replaces, deadline })
     }
 }
 
 impl From<Order> for OrderFields {
     fn from(order: Order) -> Self {
-        let Order { change, schedule, deform, guard, replaces } = order;
-        let fields = Self { schedule, deform, guard, replaces, ..Self::default() };
+        let Order { change, schedule, deform, guard, replaces, deadline } = order;
+        let fields = Self { schedule, deform, guard, replaces, deadline, ..Self::default() };
         match change {
             Change::Edits(edits) => Self { edits: Some(edits), ..fields },
             Change::Stack(stack) => Self { stack: Some(stack), ..fields },

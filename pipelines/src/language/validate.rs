@@ -76,6 +76,8 @@ impl Config {
                 found.push(Problem::new(message).within("token").within("stream"));
             }
         }
+        let limits = self.stream.iter().flat_map(|stream| stream.limits.problems());
+        limits.for_each(|problem| found.push(problem.within("limits").within("stream")));
         let no_stream = self.stream.is_none() && !unread.of_configuration;
         if self.steering.wait_for_viewer && no_stream {
             let message = "there is no `stream`, so that no viewer could connect";

@@ -162,6 +162,7 @@ export type ServerMessage =
   | { kind: "hello"; body: ToldHello }
   | { kind: "status"; body: Status }
   | { kind: "order"; body: OrderStatus }
+  | { kind: "parameters"; body: { values: Record<string, number> } }
   | { kind: "stack"; body: StackInformation }
   | { kind: "precision"; body: Precision }
   | { kind: "forecast"; body: ForecastAnswer }
@@ -248,12 +249,13 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error",
+  for (const kind of ["hello", "status", "order", "parameters", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error",
     "link", "people", "followed", "camera", "note", "note_removed"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;
     if (!isObject(body)) throw new ProtocolError(`the message "${kind}" is not an object`);
     if (kind === "forecast" && !isObject(body.order)) throw new ProtocolError('the message "forecast" has no order');
+    if (kind === "parameters" && !isObject(body.values)) throw new ProtocolError('the message "parameters" has no values');
     if (kind === "people" && !Array.isArray(body.viewers)) throw new ProtocolError('the message "people" has no viewers');
     return { kind, body: kind === "hello" ? completeHello(body) : body } as unknown as ServerMessage;
   }

@@ -246,7 +246,7 @@ export function orderForm(schema: Json | undefined): OrderForm | null {
       }
       for (const property of propertiesOf(schema, resolved, 0)) {
         // Changes of the shape, and the order whose turn this one takes: neither says how it is carried out.
-        if (["edits", "stack", "undo", "replaces"].includes(property.name)) continue;
+        if (["edits", "stack", "undo", "replaces", "deadline"].includes(property.name)) continue;
         if (!settings.has(property.name)) settings.set(property.name, property);
       }
     }

@@ -12,6 +12,8 @@ export type Action =
   // From the simulation.
   | { type: "connection"; state: ConnectionState; explanation: string }
   | { type: "hello"; hello: Hello }
+  /** The values of the parameters, by name. */
+  | { type: "parameters"; values: Readonly<Record<string, number>> }
   /** All edits that make the shape, and how many orders can be taken back. */
   | { type: "stack"; edits: Json[]; undoable: number | undefined }
   /** The stack is another one, whose edits are being fetched. */

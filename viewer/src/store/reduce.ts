@@ -42,6 +42,7 @@ function after(state: State, action: Action): State {
       };
     }
     case "hello": return withHello(state, action.hello);
+    case "parameters": return withParameters(state, action.values);
     case "stack": return withStack(state, action.edits, action.undoable);
     case "stack awaited": return state.hello ? { ...state, hello: { ...state.hello, isAwaitingEdits: true, undoable: action.undoable } } : state;
     case "precision": return { ...state, coarser: { ...state.coarser, [action.view]: action.coarser } };
@@ -147,6 +148,12 @@ function withHello(state: State, hello: Hello): State {
     refusal: hello.role !== state.hello?.role ? "" : state.refusal,
   };
   return withoutLostEdit(state, next);
+}
+
+function withParameters(state: State, values: Readonly<Record<string, number>>): State {
+  if (!state.hello) return state;
+  const parameters = state.hello.parameters.map((parameter) => ({ ...parameter, value: own(values, parameter.name) ?? parameter.value }));
+  return { ...state, hello: { ...state.hello, parameters } };
 }
 
 function withStack(state: State, edits: Json[], undoable: number | undefined): State {

@@ -46,6 +46,14 @@ describe("open boundaries", () => {
   });
 });
 
+describe("the values of parameters", () => {
+  it("are those that were told last, by name", () => {
+    const { store } = page({ parameters: [{ name: "inflow", value: 10, minimum: 0, maximum: 20 }, { name: "heating", value: 1, minimum: 0, maximum: 2 }] });
+    store.dispatch({ type: "parameters", values: { inflow: 12, unheard: 3 } });
+    expect(store.state.hello?.parameters).toEqual([{ name: "inflow", value: 12, minimum: 0, maximum: 20 }, { name: "heating", value: 1, minimum: 0, maximum: 2 }]);
+  });
+});
+
 describe("the form's state", () => {
   it("asks for nothing after Apply, so that a second one does nothing", () => {
     const { store, commands, orders } = composed();

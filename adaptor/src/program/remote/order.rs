@@ -35,6 +35,9 @@ pub(crate) struct Options {
     /// this task ends, and may still reject it
     #[arg(long)]
     wait: bool,
+    /// Have it rejected where it has waited for its turn for so long, and the run does not say less
+    #[arg(long, value_name = "SECONDS")]
+    deadline: Option<NonZeroU32>,
 }
 
 #[derive(Debug, Args)]
@@ -73,7 +76,8 @@ pub(crate) struct ReplaceOptions {
 pub(crate) fn order(options: &Options) -> Result<(), Failure> {
     let order = read_order(&options.file)?;
     let client = steer(&options.target)?;
-    let order = with_displacements(order, &client)?;
+    let mut order = with_displacements(order, &client)?;
+    order.deadline = options.deadline.or(order.deadline);
     give(&client, &order, options.wait, options.target.json)
 }
 

@@ -1,8 +1,12 @@
 //! Orders that wait: for the end of a pause, and no longer than they may.
 
-use std::{sync::Arc, time::Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use tombolo_deform::shape::Plan;
+use tombolo_pipelines::language::Order;
 
 use super::{Computing, Steerer};
 use crate::{
@@ -62,18 +66,28 @@ impl Steerer {
     /// Whether an order has waited for too long, by the clock of this process.
     pub(crate) fn is_overdue(&self) -> bool {
         let mut waiting = self.may_be_overdue();
-        waiting.any(|(_, reservation)| self.is_too_old(reservation))
+        waiting.any(|(_, order, reservation)| self.is_too_old(order, reservation))
     }
 
     /// The orders that wait for their turn or for the end of a pause, and the room that they take.
-    fn may_be_overdue(&self) -> impl Iterator<Item = (&str, Option<&Reservation>)> {
+    fn may_be_overdue(&self) -> impl Iterator<Item = (&str, &Order, Option<&Reservation>)> {
         let planned = self.computing.iter().filter(|computing| computing.planned.is_some());
-        let planned = planned.map(|it| (&*it.id, it.reservation.as_ref()));
-        planned.chain(self.waiting.iter().map(|task| (&*task.id, task.reservation.as_ref())))
+        let planned = planned.map(|it| (&*it.id, &it.order, it.reservation.as_ref()));
+        let waiting = self.waiting.iter();
+        planned.chain(waiting.map(|it| (&*it.id, &it.order, it.reservation.as_ref())))
     }
 
-    fn is_too_old(&self, reservation: Option<&Reservation>) -> bool {
-        reservation.is_some_and(|reservation| reservation.age() > self.deadline)
+    /// How long an order may wait, and the setting that says so.
+    fn deadline_of(&self, order: &Order) -> (Duration, &'static str) {
+        let own = order.deadline.map(|seconds| Duration::from_secs(seconds.get().into()));
+        match own.filter(|own| *own < self.deadline) {
+            Some(own) => (own, "its own `deadline`"),
+            None => (self.deadline, "steering.deadline"),
+        }
+    }
+
+    fn is_too_old(&self, order: &Order, reservation: Option<&Reservation>) -> bool {
+        reservation.is_some_and(|reservation| reservation.age() > self.deadline_of(order).0)
     }
 
     /// Rejects orders that have waited for too long. Collective where any wait.
@@ -81,21 +95,22 @@ impl Steerer {
         let waiting = self.may_be_overdue();
         // The clock of rank 0 counts.
         let mut overdue: Vec<u8> =
-            waiting.map(|(_, reservation)| self.is_too_old(reservation).into()).collect();
+            waiting.map(|(_, order, held)| self.is_too_old(order, held).into()).collect();
         if overdue.is_empty() {
             return;
         }
         self.domain.communicator().broadcast(0, &mut overdue);
         let waiting = self.may_be_overdue().zip(overdue).filter(|(_, is_overdue)| *is_overdue == 1);
-        let overdue: Vec<String> = waiting.map(|((id, _), _)| id.to_owned()).collect();
-        let reason = format!(
-            "it has waited for more than {} seconds (steering.deadline)",
-            self.deadline.as_secs()
-        );
-        for id in &overdue {
-            self.waiting.retain(|task| task.id != *id);
-            self.computing.take_if(|computing| computing.id == *id);
-            self.log.reject(id, moment, &reason.clone().into());
+        let reason = |order| {
+            let (deadline, setting) = self.deadline_of(order);
+            format!("it has waited for more than {} seconds ({setting})", deadline.as_secs())
+        };
+        let overdue: Vec<(String, String)> =
+            waiting.map(|((id, order, _), _)| (id.to_owned(), reason(order))).collect();
+        for (id, reason) in overdue {
+            self.waiting.retain(|task| task.id != id);
+            self.computing.take_if(|computing| computing.id == id);
+            self.log.reject(&id, moment, &reason.into());
         }
     }
 }

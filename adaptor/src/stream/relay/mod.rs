@@ -33,7 +33,7 @@ use axum::{
     routing::get,
 };
 use tokio::sync::oneshot;
-use tombolo_pipelines::language::{Embedders, Tls};
+use tombolo_pipelines::language::{Embedders, StreamLimits, Tls};
 
 use super::{
     connection::Connection,
@@ -41,6 +41,7 @@ use super::{
     gate::{self, Gate},
     links::{LinkFile, authority, fragment, with_colons},
     listener::Listener,
+    refusals::Refusals,
     relay_messages::{ATTACH, CARRY},
     socket::Socket,
     tls::{Identity, names_of},
@@ -168,7 +169,12 @@ impl Relay {
             secret.kept(&path).map_err(|reason| RelayError::Directory { path, reason })
         };
         let of_runs = kept(RUNS_FILE, KeptSecret::Relay)?;
-        let credentials = Credentials::new(of_runs, kept(PEOPLE_FILE, KeptSecret::Watch)?, COOKIE);
+        let of_people = kept(PEOPLE_FILE, KeptSecret::Watch)?;
+        // Each viewer takes one connection here and one of its run.
+        let of_viewers = settings.connections.saturating_add(settings.connections.get());
+        let most = of_viewers.saturating_add(u32::try_from(RUNS).unwrap_or(u32::MAX));
+        let limits = StreamLimits { connections: most, ..StreamLimits::default() };
+        let credentials = Credentials::new(of_runs, of_people, COOKIE, limits);
         let credentials = Arc::new(credentials);
         let failed = |source| RelayError::Listen { address: settings.listen, source };
         let (socket, address) = Socket::bind_address(settings.listen).map_err(failed)?;
@@ -178,10 +184,11 @@ impl Relay {
             None if is_open => Some(Identity::kept(directory, names_of(address))?),
             None => None,
         };
+        let refusals = Arc::<Refusals>::default();
         let state = Arc::new(RelayState {
             gate: Gate {
                 credentials: Arc::clone(&credentials),
-                refusals: gate::Refusals::default(),
+                refusals: Arc::clone(&refusals),
                 is_loopback: !is_open,
                 public: settings.public.as_deref().and_then(host_of).map(str::to_owned),
                 is_encrypted: identity.is_some(),
@@ -193,8 +200,6 @@ impl Relay {
             fingerprint: identity.as_ref().map(|identity| identity.fingerprint.clone()),
             public: settings.public.as_ref().map(|base| base.trim_end_matches('/').to_owned()),
         });
-        // Each viewer takes one connection here and one of its run.
-        let most = 2 * settings.connections.get() as usize + RUNS;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
@@ -209,7 +214,8 @@ impl Relay {
             let acceptor = identity.map(|identity| identity.acceptor);
             match listening {
                 Ok(listening) => runtime.block_on(async move {
-                    let (listener, _) = Listener::new(Some(listening), acceptor, most);
+                    let (listener, _) =
+                        Listener::new(Some(listening), acceptor, &limits, &refusals);
                     let router = router.into_make_service_with_connect_info::<Connection>();
                     tokio::select! {
                         _ = axum::serve(listener, router) => {}
@@ -333,7 +339,7 @@ async fn guard(
         None => next.run(request).await,
     };
     if is_own || is_answered {
-        relay.gate.log_refusal(None, &connection, &response);
+        relay.gate.log_refusal(&connection, &response);
         relay.gate.add_headers(&mut response);
     }
     response

@@ -238,9 +238,12 @@ class AsyncRun:
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
         replaces: Union[Order, str, None] = None,
+        deadline: Optional[int] = None,
     ) -> AsyncOrder:
         """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
-        prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces)
+        prepared = await self._prepared(
+            edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline
+        )
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.order(prepared))))
 
     async def _prepared(self, edits: Edits, **settings: Any) -> _native.Prepared:

@@ -104,6 +104,7 @@ class Run(Watched):
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
         replaces: Union[Order, str, None] = None,
+        deadline: Optional[int] = None,
     ) -> Order:
         """Give an order of a new shape; it is on its way when this returns, and `Order.wait` waits for it.
 
@@ -117,6 +118,8 @@ class Run(Watched):
             the run's configuration says.
         replaces : Order or str, optional
             An order that has not begun to move the mesh, whose place this one takes; that one is rejected.
+        deadline : int, optional
+            Seconds that it may wait for its turn, where the run's configuration does not say less; it is rejected then.
 
         Raises
         ------
@@ -133,7 +136,8 @@ class Run(Watched):
                               schedule={"steps": 10})
             order.wait()
         """
-        prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces))
+        text = _text(edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline)
+        prepared = self._prepared(text)
         self.drive()
         return Order(self, self._reader.client.order(prepared))
 
@@ -282,10 +286,12 @@ def _text(
     deform: Optional[Mapping[str, Any]] = None,
     guard: Optional[Mapping[str, Any]] = None,
     replaces: Union[Order, str, None] = None,
+    deadline: Optional[int] = None,
 ) -> tuple[str, str]:
     """An order as a text with its name."""
     other = replaces.id if isinstance(replaces, Order) else replaces
-    return _json.order(edits, {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other})
+    settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other, "deadline": deadline}
+    return _json.order(edits, settings)
 
 
 def connect(

@@ -132,6 +132,12 @@ class State:
             self.status = Status._of(data)
         elif kind == "order":
             self._take_order(data)
+        elif kind == "parameters":
+            values = data["values"]
+            before = self.hello.get("parameters", [])
+            parameters = [{**it, "value": values.get(it["name"], it["value"])} for it in before]
+            # Whoever has the one of before keeps it as it was.
+            self.hello = {**self.hello, "parameters": parameters}
         elif kind == "stack":
             self.stack = data
         elif kind == "monitor":

@@ -66,7 +66,7 @@ impl Prepared {
     pub(super) fn order(&self, stage: &OrderStage, progress: &mut Progress) {
         let edits = std::mem::take(&mut progress.edits);
         let OrderStage { schedule, deform, guard } = stage.clone();
-        let order = Order { change: Change::Edits(edits), schedule, deform, guard, replaces: None };
+        let order = Order { schedule, deform, guard, ..Order::from(Change::Edits(edits)) };
         self.command(Command::Order(order), progress);
     }
 
