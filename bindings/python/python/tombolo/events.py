@@ -44,8 +44,8 @@ class Event(NamedTuple):
     Attributes
     ----------
     kind : str
-        `hello`, `status`, `order`, `parameters`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`, `camera`,
-        `wheel` (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`, `error`, `end`,
+        `hello`, `status`, `order`, `parameters`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`,
+        `camera`, `wheel` (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`, `error`, `end`,
         `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes behind it), or the name of
         a message that this version does not know, which comes where all kinds are asked for.
     data : dict, View or str
