@@ -34,8 +34,8 @@ class Event(NamedTuple):
     kind : str
         `hello`, `status`, `order`, `parameters`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`,
         `camera`, `wheel` (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`,
-        `error`, `end`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes behind it), or the name of
-        a message that this version does not know, which comes where all kinds are asked for.
+        `error`, `end`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes behind it),
+        or the name of a message that this version does not know, which comes where all kinds are asked for.
     data : dict, View or str
         The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
     """
