@@ -263,6 +263,11 @@ impl Client {
         self.give(Command::Pipelines(change.map_err(of_language)?))
     }
 
+    /// Gives the wheel to another client by its name in the run.
+    fn hand_over(&self, py: Python<'_>, to: &str, patience: f64) -> PyResult<()> {
+        guarded(|| py.detach(|| self.client.hand_over(to, seconds(patience)).map_err(of_client)))
+    }
+
     /// A link that opens one browser, once, to watch or to drive.
     fn link_for(&self, py: Python<'_>, rights: &str, patience: f64) -> PyResult<String> {
         let rights = match rights {

@@ -221,6 +221,18 @@ def test_one_who_only_looks_keeps_nobody_from_steering(solver):
             looks.set("heating", 3, timeout=30)
 
 
+def test_the_wheel_is_handed_over_to_who_asks_for_it(solver):
+    with tombolo.connect(solver.link) as first, tombolo.connect(solver.link) as second:
+        with pytest.raises(tombolo.NotDriverError):
+            first.hand_over("c1")
+        first.drive()
+        with pytest.raises(tombolo.RejectedError, match="c99"):
+            first.hand_over("c99")
+        first.on("wheel", lambda event: first.hand_over(event.data["asked_by"]))
+        assert wait(lambda: drives(second), 30)
+        assert not first.drives
+
+
 def test_a_closed_run_gives_up_the_wheel_though_it_is_still_held(solver):
     first = tombolo.connect(solver.link)
     first.drive()

@@ -268,6 +268,10 @@ class AsyncRun:
         question = await self._send(lambda client: client.forecast(prepared))
         return await self._carry_out(self.run._foretold(question, timeout))
 
+    async def hand_over(self, to: str, timeout: float = 60.0) -> None:
+        """As `Run.hand_over`."""
+        await _in_thread(lambda: self.run.hand_over(to, timeout))
+
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
         """As `Run.link_for`."""
         return await _in_thread(lambda: self.run.link_for(rights, timeout))

@@ -71,6 +71,32 @@ class Run(Watched):
         while not self._ask_for_wheel(until):
             pass
 
+    def hand_over(self, to: str, timeout: float = 60.0) -> None:
+        """Give the wheel to another client; it is there when this returns.
+
+        Parameters
+        ----------
+        to : str
+            The client's name in the run, such as ``c4``: an event `wheel` says who asks for it (``asked_by``), and
+            `people` who is there.
+        timeout : float
+            Seconds to wait, at most.
+
+        Raises
+        ------
+        NotDriverError
+            This client does not steer.
+        RejectedError
+            There is no such client, or it may only watch.
+
+        Examples
+        --------
+        ::
+
+            run.on("wheel", lambda event: run.hand_over(event.data["asked_by"]))
+        """
+        in_thread(lambda: self._reader.client.hand_over(to, timeout))
+
     def _ask_for_wheel(self, until: float) -> bool:
         """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then."""
         self._reader.check_goes_on()
