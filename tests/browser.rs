@@ -134,13 +134,9 @@ fn the_viewer_in_a_page_of_others_in_a_browser() {
     let _alone = alone();
     let [named, other] = free_ports();
     let page = format!("http://localhost:{named}");
-    let (_small, run) = small(&json!({"embed": [page]}), &[]);
-    drive_at(
-        "framing.mjs",
-        &run.link().url(),
-        &run,
-        &[("TOMBOLO_PAGES", format!("{named} {other}"))],
-    );
+    let (_small, mut run) = small(&json!({"embed": [page]}), &[]);
+    let url = run.link().url();
+    drive_at("framing.mjs", &url, &run, &[("TOMBOLO_PAGES", format!("{named} {other}"))]);
 }
 
 /// The way of a site: the browser, a network that is cut for half a minute, a proxy with a certificate
