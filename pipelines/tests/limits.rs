@@ -8,8 +8,8 @@ use tombolo_pipelines::language::{
     parse_valid,
 };
 use tombolo_pipelines::limits::{
-    ALL, DEPTH, DOCUMENT, EDITS, FORMULA, LISTED, Limit, SHAPES, TEXT, VALUES, WAITING,
-    WAITING_BYTES,
+    ALL, DEPTH, DOCUMENT, EDITS, FORMULA, LISTED, Limit, PENDING, PENDING_BYTES, SHAPES, TEXT,
+    VALUES, WAITING, WAITING_BYTES,
 };
 
 fn words(limit: Limit, found: usize) -> String {

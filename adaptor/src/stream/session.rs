@@ -23,7 +23,7 @@ use super::{
     gate::Gate,
     hub::Hub,
     outbox::{Client, Message},
-    refusals::Refused,
+    refusals::{Refusals, Refused},
     text::Text,
     viewer_lines::ViewerLines,
 };
@@ -44,7 +44,8 @@ pub(super) async fn serve(
     shared: Shared,
 ) {
     let Shared { hub, commands, gate, lines, .. } = shared;
-    let seat = Seat { client: &client, hub: &hub, commands: &*commands, lines: &lines, address };
+    let (hub, lines, refusals) = (&*hub, &*lines, &*gate.refusals);
+    let seat = Seat { client: &client, hub, commands: &*commands, lines, refusals, address };
     seat.note(ViewerMove::Came);
     if hub.is_driver(client.id) {
         commands.driven();
@@ -52,7 +53,7 @@ pub(super) async fn serve(
     let (sink, stream) = socket.split();
     // Reading goes on while a write waits, so that a command is never stuck behind a frame.
     tokio::select! {
-        () = write(sink, &client, &hub, &*commands) => {}
+        () = write(sink, &client, hub, &*commands) => {}
         () = read(stream, &seat, &holder, &gate) => {}
     }
 }
@@ -63,10 +64,19 @@ struct Seat<'a> {
     hub: &'a Hub,
     commands: &'a dyn CommandSink,
     lines: &'a ViewerLines,
+    refusals: &'a Refusals,
     address: IpAddr,
 }
 
 impl Seat<'_> {
+    /// Tells that something of this viewer was refused, unless that was told of late; `what` says what, of
+    /// whom it is told.
+    fn refuse(&self, refused: Refused, what: impl FnOnce(&str) -> String) {
+        let (viewer, address) = (Hub::name(self.client.id), self.address);
+        let what = || what(&format!("the viewer {viewer} from {address}"));
+        self.refusals.tell(address, refused, Some(&viewer), what);
+    }
+
     /// Notes in the journal who came and went, and who was given a link for others, unless there has
     /// been too much of it of late.
     fn note(&self, did: ViewerMove) {
@@ -162,16 +172,11 @@ async fn write(
 
 async fn read(mut stream: SplitStream<WebSocket>, seat: &Seat<'_>, holder: &Holder, gate: &Gate) {
     let client = seat.client;
-    let refused = |refused, what: &dyn Fn(&str) -> String| {
-        let (viewer, address) = (Hub::name(client.id), seat.address);
-        let who = format!("the viewer {viewer} from {address}");
-        gate.refusals.tell(address, refused, Some(&viewer), || what(&who));
-    };
     while let Some(message) = stream.next().await {
         let message = match message {
             Err(error) => {
                 if is_too_long(error) {
-                    refused(Refused::Long, &|who| {
+                    seat.refuse(Refused::Long, |who| {
                         format!("a message of {who} ended its connection")
                     });
                 }
@@ -195,11 +200,11 @@ async fn read(mut stream: SplitStream<WebSocket>, seat: &Seat<'_>, holder: &Hold
         };
         // Waiting here leaves the rest in the viewer's own socket.
         while !lock(&holder.allowance).take(bytes(&message)) {
-            refused(Refused::Flood, &|who| format!("messages of {who} are held back"));
+            seat.refuse(Refused::Flood, |who| format!("messages of {who} are held back"));
             tokio::time::sleep(HELD_BACK).await;
         }
         let answer = match message {
-            Wire::Text(text) => receive(&text, seat, &gate.credentials, &refused),
+            Wire::Text(text) => receive(&text, seat, &gate.credentials),
             _ => Err((
                 None,
                 "a binary message that is not the number of frames decoded, 8 bytes, more than \
@@ -226,7 +231,6 @@ fn receive(
     text: &str,
     seat: &Seat<'_>,
     credentials: &Credentials,
-    refused: &dyn Fn(Refused, &dyn Fn(&str) -> String),
 ) -> Result<(), (Option<String>, String)> {
     let Seat { client, hub, commands, .. } = *seat;
     let drives = hub.is_driver(client.id);
@@ -240,7 +244,9 @@ fn receive(
     // A viewer that watches can send a `drive` or a note; a longer message is not worth reading.
     if !drives && text.len() > most {
         let bytes = text.len();
-        refused(Refused::Long, &|who| format!("a message of {who} of {bytes} bytes was not read"));
+        seat.refuse(Refused::Long, |who| {
+            format!("a message of {who} of {bytes} bytes was not read")
+        });
         return Err((None, watches.into()));
     }
     let (id, message) = parse_message(text);
@@ -254,7 +260,7 @@ fn receive(
         Ok(Said::Together(together)) => take(together, id.clone(), seat, credentials),
         message if !drives => {
             let asked = message.as_ref().map_or("what nobody understands", asked_for);
-            refused(Refused::Command, &|who| format!("{who} asked for {asked} in vain"));
+            seat.refuse(Refused::Command, |who| format!("{who} asked for {asked} in vain"));
             Err(watches.into())
         }
         Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
