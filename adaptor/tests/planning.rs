@@ -255,24 +255,30 @@ fn a_stop_of_a_list_begins_no_order_of_its_step() {
 
 #[test]
 fn orders_of_a_mesh_that_was_replaced_have_an_outcome() {
-    let orders = json!([
-        {"at": {"cycle": 1}, "order": {"schedule": {"steps": 8}, "edits": squeeze(0.2)["edits"]}},
-        {"at": {"cycle": 2}, "order": squeeze(0.1)}
-    ]);
-    let orders = parse_orders(&orders.to_string(), "orders.json").unwrap();
-    let mut solver = Solver::new(Settings { orders, ..Settings::default() });
-    solver.steps(4);
-    solver.adaptor.release_shape("the solver refines its mesh");
+    let mut solver = solver();
+    let mut viewer = driven(&mut solver);
+    let mut first = squeeze(0.2);
+    first["schedule"] = json!({"steps": 1000});
+    viewer.send(&json!({"id": "first", "order": first}));
+    solver.step_until_told(&mut viewer, "order", has_status("first", "applying"));
     solver.steps(2);
-    let report = solver.finish();
-    let outcomes: Vec<(OrderStatus, &str)> = report
-        .orders
-        .iter()
-        .map(|order| (order.status, order.reason.as_deref().unwrap_or_default()))
-        .collect();
-    let [(first, ended), (second, rejected)] = outcomes[..] else { panic!("{outcomes:?}") };
-    assert!(first == OrderStatus::Applied && ended.contains("of 8: the solver refines"), "{ended}");
-    assert_eq!((second, rejected), (OrderStatus::Rejected, "the solver refines its mesh"));
+    viewer.send(&json!({"id": "second", "order": long(0.3)}));
+    solver.step_until_told(&mut viewer, "order", has_status("second", "computing"));
+    viewer.send(&json!({"id": "third", "order": squeeze(0.1)}));
+    solver.step_until_told(&mut viewer, "order", has_status("third", "accepted"));
+    solver.adaptor.release_shape("the solver refines its mesh");
+    solver.step();
+    let orders = solver.finish().orders;
+    let reasons = orders.iter().map(|order| (order.status, order.reason.as_deref()));
+    let reasons: Vec<_> = reasons.map(|(status, why)| (status, why.unwrap_or_default())).collect();
+    let [first, second, third] = reasons[..] else { panic!("{orders:?}") };
+    let (status, why) = first;
+    assert!(
+        status == OrderStatus::Applied && why.ends_with("of 1000: the solver refines its mesh"),
+        "{why}"
+    );
+    let refused = (OrderStatus::Rejected, "the solver refines its mesh");
+    assert_eq!([second, third], [refused, refused]);
 }
 
 #[test]

@@ -184,7 +184,7 @@ orders.json:6:27: [5]: found no command, expected one of `order`, `pause`, `resu
 {"id":"c","stat"#,
         ),
         r#"
-orders.json:1:70: order.gard: found the unknown key `gard`, expected `edits`, `stack`, `undo`, `schedule`, `deform`, `guard` or `replaces`; did you mean `guard`?
+orders.json:1:70: order.gard: found the unknown key `gard`, expected `edits`, `stack`, `undo`, `schedule`, `deform`, `guard`, `replaces` or `deadline`; did you mean `guard`?
 orders.json:1:90: order.gard.otherwise: found the unknown name `pray`, expected `reject`, `untangle` or `clamp`
 orders.json:2:20: status: found the unknown name `acepted`, expected `accepted`, `applied`, `rejected`, `not_followed` or `not_confirmed`; did you mean `accepted`?
 orders.json:2:38: cycle: found "4", expected a whole number from 0 to 18446744073709551615
