@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import os
 import threading
 import time as clock
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, Optional, TypeVar
 
 from . import _json, _native
@@ -189,16 +188,15 @@ class Reader:
                 raise self._over(self.failure)
             return answer
 
-    @contextlib.contextmanager
-    def telling(self, tell: Callable[[], None]) -> Iterator[None]:
+    def begin_telling(self, tell: Callable[[], None]) -> None:
         """Have a function called whenever there may be something new, by any thread; it must not wait."""
         with self.changed:
             self._tells.append(tell)
-        try:
-            yield
-        finally:
-            with self.changed:
-                self._tells.remove(tell)
+
+    def end_telling(self, tell: Callable[[], None]) -> None:
+        """Have the function called no more."""
+        with self.changed:
+            self._tells.remove(tell)
 
     def carry_out(self, parts: Parts[Result]) -> Result:
         """Carry out a wait in parts."""

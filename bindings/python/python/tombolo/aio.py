@@ -8,7 +8,7 @@ import os
 import threading
 import time as clock
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Generator, Mapping
+from collections.abc import AsyncIterator, Callable, Generator, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
 
 from . import _json
@@ -32,16 +32,52 @@ __all__ = ["AsyncOrder", "AsyncRun", "connect"]
 Found = TypeVar("Found")
 
 
+class _Waits:
+    """The waits of one loop for one run: they look again together, once for all that has come meanwhile."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, reader: Reader) -> None:
+        self._loop, self._reader = loop, reader
+        self._told: set[asyncio.Event] = set()
+        self._is_due = False
+
+    @contextlib.contextmanager
+    def one(self) -> Iterator[asyncio.Event]:
+        """One wait, which is told by this event that there may be something new."""
+        told = asyncio.Event()
+        if not self._told:
+            self._reader.begin_telling(self._tell)
+        self._told.add(told)
+        try:
+            yield told
+        finally:
+            self._told.remove(told)
+            if not self._told:
+                del _WAITS[self._loop, self._reader]
+                self._reader.end_telling(self._tell)
+
+    def _tell(self) -> None:
+        """By the thread that reads: a loop that is slower than what comes has one call that waits, not thousands."""
+        if not self._is_due:
+            self._is_due = True
+            # A loop that was closed has nobody who waits.
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._look)
+
+    def _look(self) -> None:
+        self._is_due = False
+        for told in self._told:
+            told.set()
+
+
+#: The waits that there are. Those of a loop are made and ended on it.
+_WAITS: dict[tuple[asyncio.AbstractEventLoop, Reader], _Waits] = {}
+
+
 async def _wait_for(reader: Reader, found: Callable[[], Found], timeout: Optional[float]) -> Found:
     """A wait that holds no thread: the one that reads has the loop look again."""
-    loop, told, until = asyncio.get_running_loop(), asyncio.Event(), moment_after(timeout)
-
-    def tell() -> None:
-        # A loop that was closed has nobody who waits.
-        with contextlib.suppress(RuntimeError):
-            loop.call_soon_threadsafe(told.set)
-
-    with reader.telling(tell):
+    loop, until = asyncio.get_running_loop(), moment_after(timeout)
+    waits = _WAITS.setdefault((loop, reader), _Waits(loop, reader))
+    with waits.one() as told:
         while True:
             told.clear()
             answer = reader.look(found)
