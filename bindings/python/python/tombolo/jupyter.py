@@ -111,7 +111,7 @@ def summary(run: Run) -> str:
         f'<td style="text-align: left">{html.escape(text)}</td></tr>'
         for name, text in rows
     )
-    pages = run._state.hello.get("embed", ()) if run.connected else ()
+    pages = run._state.hello.get("embed", ()) if run.connected and end is None else ()
     return f"<table>{cells}</table>{viewer(run.link, pages)}"
 
 
