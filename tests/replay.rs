@@ -74,6 +74,7 @@ fn a_journal_plays_back_to_the_same_bits() {
     let mut run = Run::flow(&live.arguments(&["--pipelines", "@pipelines.json", "--steps", "40"]));
     let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
+    driver.wait_for("status", |status| status["paused"] == true);
     driver.send(&json!({"id": "first", "order": pinch(0.8)}));
     // What is planned before the run goes on is carried out before it ends.
     driver.wait_for("order", |order| waits_for_resume(order, &order["id"]));
@@ -118,6 +119,7 @@ fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     let mut order = pinch(0.9);
     order["schedule"] = json!({"steps": 12, "every": {"steps": 2}});
+    driver.wait_for("status", |status| status["paused"] == true);
     driver.send(&json!({"id": "first", "order": order}));
     driver.wait_for("order", |order| waits_for_resume(order, &json!("first")));
     driver.resume();
