@@ -3,7 +3,7 @@
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message as Wire;
@@ -272,7 +272,8 @@ fn a_viewer_that_dies_in_mid_frame_costs_nothing() {
     dead.wait_for("hello", |_| true);
     dead.kill();
     // The wheel is free again a few seconds after its holder has gone.
-    let mut driver = drive(&link);
+    let mut driver = Viewer::connect(&link).expect("the run lets in");
+    driver.take_wheel();
     let mut other = Viewer::connect(&link).expect("the run lets in");
     assert!(other.frame().starts_with(b"TMBL"));
     // Not before the run holds by itself: it would hold again after a pause and a resume that come
@@ -281,28 +282,6 @@ fn a_viewer_that_dies_in_mid_frame_costs_nothing() {
     driver.send(&json!({"id": "after", "pause": {}}));
     finish(run, driver);
     assert!(small.bytes("out/last.vtu") == undisturbed());
-}
-
-/// A viewer that has the wheel, which may be kept for another for some seconds.
-fn drive(link: &Link) -> Viewer {
-    let mut viewer = Viewer::connect(link).expect("the run lets in");
-    let hello = viewer.wait_for("hello", |_| true);
-    let mut drives = hello["role"] == "driver";
-    let until = Instant::now() + PATIENCE;
-    while !drives {
-        assert!(Instant::now() < until, "the wheel was never free");
-        std::thread::sleep(Duration::from_millis(500));
-        viewer.send(&json!({"id": "wheel", "drive": {}}));
-        // It is answered with a new hello where it is granted, and else with an error.
-        drives = loop {
-            match viewer.next(PATIENCE).expect("an answer comes") {
-                Message::Text(answer) if answer["hello"]["role"] == "driver" => break true,
-                Message::Text(answer) if answer["error"]["id"] == "wheel" => break false,
-                Message::Text(_) | Message::Frame(_) => {}
-            }
-        };
-    }
-    viewer
 }
 
 #[test]

@@ -164,6 +164,29 @@ impl Viewer {
         self.send(&serde_json::json!({"resume": {}}));
     }
 
+    /// Asks for the wheel until it is there: it may be kept for another for some seconds. Frames that
+    /// come meanwhile are passed over.
+    ///
+    /// # Panics
+    /// Where it is not there in a long time.
+    pub fn take_wheel(&mut self) {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            self.send(&serde_json::json!({"id": "wheel", "drive": {}}));
+            // It is answered with a new hello where it is granted, and else with an error; who has it
+            // already is answered with nothing.
+            loop {
+                match self.next(PATIENCE).expect("an answer comes") {
+                    Message::Text(answer) if answer["hello"]["role"] == "driver" => return,
+                    Message::Text(answer) if answer["error"]["id"] == "wheel" => break,
+                    Message::Text(_) | Message::Frame(_) => {}
+                }
+            }
+            assert!(Instant::now() < until, "the wheel was never free");
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    }
+
     /// Waits for the next frame.
     ///
     /// # Panics
