@@ -75,7 +75,7 @@ impl Paraview {
         command
             .args(["-n", "19"])
             .arg(target().join("third-party/paraview/pvpython"))
-            .arg(project().join("benchmarks/peers/paraview.py"))
+            .arg(project().join("benchmarks/peers/follow_in_paraview.py"))
             // Not among its arguments: the link is a secret.
             .env("TOMBOLO_LINK", link)
             .env("PYTHONPATH", std::env::join_paths(paths)?)

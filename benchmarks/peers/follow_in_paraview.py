@@ -1,6 +1,6 @@
 """Follows a run in ParaView without an interface, as the interface does it: asks ten times a second what is new, and shows it.
 
-    TOMBOLO_LINK=http://127.0.0.1:7070/?token=... pvpython benchmarks/peers/paraview.py
+    TOMBOLO_LINK=http://127.0.0.1:7070/?token=... pvpython benchmarks/peers/follow_in_paraview.py
 
 Goes on until it is killed, and says after each step that it has shown how many there were.
 """
