@@ -3,13 +3,10 @@
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::time::Duration;
 
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message as Wire;
-use tombolo_tests::{
-    Link, Message, NOZZLE_FEATURES, PATIENCE, Run, Small, Viewer, program, tombolo,
-};
+use tombolo_tests::{Link, NOZZLE_FEATURES, PATIENCE, Run, Small, Viewer, program, tombolo};
 
 /// A run that streams its surface, waits at its first step, and writes its mesh at its last.
 fn paused() -> Small {

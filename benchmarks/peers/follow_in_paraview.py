@@ -1,4 +1,4 @@
-"""Follows a run in ParaView without an interface, as the interface does it: asks ten times a second what is new, and shows it.
+"""Follows a run in ParaView without an interface, as that does it: asks ten times a second what is new, and shows it.
 
     TOMBOLO_LINK=http://127.0.0.1:7070/?token=... pvpython benchmarks/peers/follow_in_paraview.py
 
