@@ -44,8 +44,8 @@ pub enum InitializeError {
     /// Something is wrong on one rank. All ranks have this error.
     #[error(transparent)]
     Rank(#[from] RankError),
-    /// What one rank was given makes no sense, or the ranks were given different things. All ranks
-    /// have this error.
+    /// One rank was given something that makes no sense, or the ranks were given different things. All
+    /// ranks have this error.
     #[error(transparent)]
     Given(RankError),
 }

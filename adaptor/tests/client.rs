@@ -7,7 +7,7 @@ use std::{
     io::{Read, Write},
     net::{SocketAddr, TcpListener, TcpStream},
     path::Path,
-    process::{Command, Output},
+    process::Output,
     sync::{
         Arc, Mutex,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -16,7 +16,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{LINK_TO_ALL, PATIENCE, Solver, config, squeeze};
+use common::{LINK_TO_ALL, PATIENCE, Solver, config, program::tombolo, squeeze};
 use serde_json::Value;
 use tokio_tungstenite::tungstenite;
 use tombolo::{
@@ -422,17 +422,6 @@ fn what_is_no_run_or_not_this_one_is_told_by_name() {
     run.end();
     let error = Client::connect(&link, &Options::default()).err();
     assert!(matches!(error, Some(ClientError::Refused { .. })), "{error:?}");
-}
-
-fn tombolo(directory: &Path, arguments: &[&str]) -> (i32, String, Output) {
-    let output = Command::new(env!("CARGO_BIN_EXE_tombolo"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned()
-        + &String::from_utf8_lossy(&output.stderr);
-    (output.status.code().expect("a code"), said, output)
 }
 
 fn lines(output: &Output) -> Vec<Value> {

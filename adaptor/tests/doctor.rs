@@ -4,9 +4,9 @@
 
 mod common;
 
-use std::{io::Read, net::TcpListener, path::Path, process::Command, time::Duration};
+use std::{io::Read, net::TcpListener, path::Path, time::Duration};
 
-use common::{Solver, config, running::Running, squeeze};
+use common::{Solver, config, program::tombolo, running::Running, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Settings,
@@ -15,21 +15,9 @@ use tombolo::{
     stream::relay::{Relay, RelaySettings},
 };
 
-/// What a task prints, and how it ends.
-fn tombolo(directory: &Path, arguments: &[&str]) -> (i32, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_tombolo"))
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned()
-        + &String::from_utf8_lossy(&output.stderr);
-    (output.status.code().expect("a code"), said)
-}
-
 /// Checks what `doctor` says of a link.
 fn doctor(link: &str, code: i32, expected: &[&str]) {
-    let (found, said) = tombolo(Path::new("."), &["doctor", link]);
+    let (found, said, _) = tombolo(Path::new("."), &["doctor", link]);
     assert_eq!(found, code, "{said}");
     for part in expected {
         assert!(said.contains(part), "{part:?} in {said}");
@@ -77,21 +65,21 @@ fn the_output_of_a_run_is_enough_to_steer_it() {
     std::fs::write(at.join("run.log"), format!("begins\n{}\nstep 1\n", run.invitation))
         .expect("written");
     std::fs::write(at.join("squeeze.json"), squeeze(0.1).to_string()).expect("written");
-    let (code, said) = tombolo(at, &["order", "run.log", "squeeze.json", "--wait"]);
+    let (code, said, _) = tombolo(at, &["order", "run.log", "squeeze.json", "--wait"]);
     assert!(code == 0 && said.contains("applied"), "{code}: {said}");
     // A rejection is told once.
     std::fs::write(at.join("too-far.json"), squeeze(1.5).to_string()).expect("written");
-    let (code, said) = tombolo(at, &["order", "run.log", "too-far.json", "--wait"]);
+    let (code, said, _) = tombolo(at, &["order", "run.log", "too-far.json", "--wait"]);
     assert!(code == 1 && said.matches("rejected").count() == 1, "{code}: {said}");
     // What a run that was killed leaves lies beside it.
     std::fs::write(at.join("tombolo-1.link"), "drive: http://127.0.0.1:1/?token=a\n")
         .expect("written");
     let own = told(&run.invitation).to_str().expect("a path");
     for more in [&[][..], &["squeeze.json"]] {
-        let (code, said) = tombolo(at, &[&["order", own, "tombolo-1.link"][..], more].concat());
+        let (code, said, _) = tombolo(at, &[&["order", own, "tombolo-1.link"][..], more].concat());
         assert!(code == 2 && said.contains("found 2 files of links"), "{code}: {said}");
     }
-    let (code, said) = tombolo(at, &["pause", &run.watch]);
+    let (code, said, _) = tombolo(at, &["pause", &run.watch]);
     let reason =
         "this client only watches: the secret or link that this viewer came with is for watching";
     assert!(code == 1 && said.contains(reason), "{code}: {said}");
@@ -181,8 +169,8 @@ fn a_recording_is_called_one() {
     assert_eq!(link(told(&invitation), "drive"), None);
     let file = told(&invitation).to_str().expect("a path");
     doctor(file, 0, &["this is a recording, of which nothing can be ordered"]);
-    let (code, said) = tombolo(directory.path(), &["status", file]);
+    let (code, said, _) = tombolo(directory.path(), &["status", file]);
     assert!(code == 0 && said.starts_with("recording: cycle "), "{code}: {said}");
-    let (code, said) = tombolo(directory.path(), &["pause", file]);
+    let (code, said, _) = tombolo(directory.path(), &["pause", file]);
     assert!(code == 1 && said.contains("this is a recording"), "{code}: {said}");
 }

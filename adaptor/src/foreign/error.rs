@@ -6,7 +6,7 @@ use tombolo_pipelines::language::{LanguageErrors, ReadError};
 
 use crate::{CheckpointError, ExecuteError, FinalizeError, InitializeError};
 
-/// What an error is about, as classes of errors tell it.
+/// The subject of an error, by which a binding chooses its class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A configuration, orders, a parameter or a condition.
@@ -135,7 +135,7 @@ impl RunError {
         }
     }
 
-    /// What the error is about: the same on all ranks.
+    /// The subject of the error, the same on all ranks.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {

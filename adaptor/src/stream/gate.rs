@@ -28,10 +28,13 @@ const HEADERS: [(HeaderName, &str); 3] = [
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
-/// What a page of the viewer may load and do; which pages may show it inside of them comes behind.
+/// The content security policy of the viewer, up to the names of the pages that may show it in a frame.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
     img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self'; object-src 'none'; \
     base-uri 'none'; form-action 'none'; frame-ancestors";
+
+/// The policy that allows nothing at all.
+const NOTHING: &str = "default-src 'none'; frame-ancestors 'none'";
 
 /// Says which pages may show the viewer inside of them.
 #[derive(Debug)]
@@ -44,10 +47,10 @@ impl Framing {
     pub(super) fn of(embedders: &Embedders) -> Self {
         let pages: Vec<&str> = embedders.iter().map(PageOrigin::as_str).collect();
         let pages = if pages.is_empty() { "'none'".into() } else { pages.join(" ") };
-        // An origin is made of letters that a header may have; were it not, no page may.
+        // An origin is made of letters that a header may have; were it not, nothing would be allowed.
         let policy = HeaderValue::from_str(&format!("{POLICY} {pages}"));
         let is_allowed = policy.is_ok() && !embedders.is_empty();
-        let policy = policy.unwrap_or(HeaderValue::from_static("frame-ancestors 'none'"));
+        let policy = policy.unwrap_or(HeaderValue::from_static(NOTHING));
         Self { policy, is_allowed }
     }
 }
@@ -103,7 +106,7 @@ impl Gate {
         if !self.framing.is_allowed {
             headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
         }
-        // What holds data of the run, or a secret, is kept nowhere.
+        // No cache keeps an answer: it may hold data of the run, or a secret.
         headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
     }
 

@@ -1,6 +1,7 @@
 //! A tiny solver, and a viewer that speaks the protocol, for the tests.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+pub mod program;
 pub mod running;
 
 use std::time::{Duration, Instant};

@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use super::relay_address::is_host;
+
 /// Bytes that an origin may have.
 const LENGTH: usize = 260;
 
@@ -60,12 +62,7 @@ impl FromStr for PageOrigin {
         if port == Some(None) {
             return Err(wrong("its port is not a number from 1 to 65535"));
         }
-        let is_bracketed = host
-            .strip_prefix('[')
-            .and_then(|host| host.strip_suffix(']'))
-            .is_some_and(|host| host.parse::<std::net::Ipv6Addr>().is_ok());
-        let known = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-        if host.is_empty() || !is_bracketed && !host.chars().all(known) {
+        if !is_host(host) {
             return Err(wrong("it names no host; a name stands for no other, and there is no *"));
         }
         let usual = if scheme == "http" { 80 } else { 443 };

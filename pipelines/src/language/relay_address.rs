@@ -60,6 +60,16 @@ impl RelayAddress {
     }
 }
 
+/// Whether a text names one host: by name, by an IPv4 address, or by an IPv6 address in brackets.
+pub(super) fn is_host(text: &str) -> bool {
+    let bracketed = text.strip_prefix('[').and_then(|text| text.strip_suffix(']'));
+    let known = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+    match bracketed {
+        Some(address) => address.parse::<std::net::Ipv6Addr>().is_ok(),
+        None => !text.is_empty() && text.chars().all(known),
+    }
+}
+
 impl FromStr for RelayAddress {
     type Err = String;
 
@@ -88,12 +98,7 @@ impl FromStr for RelayAddress {
         if !port.parse::<u16>().is_ok_and(|port| port > 0) {
             return Err(wrong("its port is not a number from 1 to 65535"));
         }
-        let is_bracketed = host
-            .strip_prefix('[')
-            .and_then(|host| host.strip_suffix(']'))
-            .is_some_and(|host| host.parse::<std::net::Ipv6Addr>().is_ok());
-        let known = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
-        if host.is_empty() || !is_bracketed && !host.chars().all(known) {
+        if !is_host(host) {
             return Err(wrong("it names no host"));
         }
         if !is_encrypted && !LOOPBACK.contains(&host) {

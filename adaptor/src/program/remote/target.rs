@@ -56,7 +56,7 @@ pub(crate) enum TargetError {
     Open { log: PathBuf, path: PathBuf, mode: u32 },
 }
 
-/// What a file leads to.
+/// The outcome of reading a file for links.
 enum Found {
     Link(Link),
     /// The file of links of the last run that has told one.

@@ -26,7 +26,7 @@ impl Steerer {
     /// refused at once.
     pub(super) fn take_plan(
         &mut self,
-        computing: Computing,
+        mut computing: Computing,
         plan: Result<Plan, Rejection>,
         moment: Moment,
         begun: Instant,
@@ -35,7 +35,6 @@ impl Steerer {
         match plan {
             Ok(plan) if self.paused => {
                 // It is the pause that it waits for from now on, and no more the finding of its shapes.
-                let mut computing = computing;
                 computing.reservation.iter_mut().for_each(Reservation::renew);
                 self.log.update(&computing.id, |order| {
                     order.waits_for = Some("the run to go on, which is paused".into());

@@ -77,11 +77,12 @@ def _framed(link: str, pages: Sequence[str]) -> Optional[str]:
         # A page that is encrypted has no frame that is not, and the other way round no cookie.
         if of_page.scheme != parts.scheme or of_page.hostname is None or parts.hostname is None:
             continue
-        if of_page.hostname in _LOOPBACK and parts.hostname in _LOOPBACK:
+        are_here = [hostname in _LOOPBACK for hostname in (of_page.hostname, parts.hostname)]
+        if all(are_here):
             place = of_page.netloc.rsplit(":", 1)[0] if of_page.port is not None else of_page.netloc
             port = "" if parts.port is None else f":{parts.port}"
             return urlunsplit(parts._replace(netloc=f"{place}{port}"))
-        if (of_page.hostname in _LOOPBACK) == (parts.hostname in _LOOPBACK):
+        if not any(are_here):
             return link
     return None
 
