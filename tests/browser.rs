@@ -8,7 +8,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Proxy, Run, Small, driving, free_ports, program, project};
+use tombolo_tests::{
+    PATIENCE, Proxy, Run, Small, driving, free_ports, gallery, generated_mesh, program, project,
+};
 
 /// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
@@ -28,6 +30,7 @@ fn drive_at(script: &str, url: &str, run: &Run, variables: &[(&str, String)]) {
         .current_dir(project())
         .env("TOMBOLO_URL", url)
         .env("TOMBOLO_PID", run.process().to_string())
+        .env("TOMBOLO_GALLERY", gallery(""))
         .envs(variables.iter().map(|(name, value)| (name, value)))
         .arg(Path::new("tests/browser").join(script))
         .output()
@@ -43,15 +46,7 @@ fn drive_at(script: &str, url: &str, run: &Run, variables: &[(&str, String)]) {
 
 /// A case of the demos, running, its mesh made where it is not there.
 fn running(case: &str, mesh: &str) -> Run {
-    if !project().join(format!("meshes/{mesh}.msh")).exists() {
-        let made = Command::new(project().join(".venv/bin/python"))
-            .current_dir(project())
-            .args(["scripts/meshes", mesh])
-            .status()
-            .expect("gmsh is installed (scripts/setup)");
-        let is_there = project().join(format!("meshes/{mesh}.msh")).exists();
-        assert!(made.success() && is_there, "scripts/meshes made no mesh");
-    }
+    let _ = generated_mesh(mesh);
     let case = format!("examples/flow/cases/{case}.json");
     Run::flow(&["--case", &case, "--listen", "127.0.0.1:0"])
 }

@@ -2,14 +2,13 @@
 //! degrees less by one drag of the skeleton.
 
 use std::process::Command;
-use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::files::read_mesh;
-use tombolo_tests::{project, tombolo};
+use tombolo_tests::{gallery, generated_mesh, project, succeed, target, tombolo};
 
 const MESH: &str = "meshes/bypass-0.msh";
 
@@ -53,22 +52,9 @@ fn outlet_angle(triangles: &[[u32; 3]], points: &[Vector]) -> f64 {
     1.0f64.atan2(-slope).to_degrees()
 }
 
-fn make_mesh() {
-    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    if !project().join(MESH).exists() {
-        let made = Command::new(project().join(".venv/bin/python"))
-            .current_dir(project())
-            .args(["scripts/meshes", "bypass-0"])
-            .status()
-            .expect("gmsh is installed (scripts/setup)");
-        assert!(made.success(), "scripts/meshes made no mesh");
-    }
-}
-
 #[test]
 fn vtk_reads_the_skeleton_that_the_program_writes() {
-    make_mesh();
+    let _ = generated_mesh("bypass-0");
     let directory = tempfile::tempdir().expect("a directory");
     let out = directory.path().join("skeleton.vtp");
     let output =
@@ -131,7 +117,7 @@ fn vtk_reads_the_skeleton_that_the_program_writes() {
 
 #[test]
 fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
-    make_mesh();
+    let _ = generated_mesh("bypass-0");
     // The order that the demo replays.
     let orders = std::fs::read_to_string(project().join("examples/flow/orders/bypass-angle.json"))
         .expect("the order");
@@ -170,4 +156,16 @@ fn one_drag_of_the_skeleton_makes_the_outlet_of_the_bypass_less_steep() {
     let [before, after] =
         [surface.points(), &points].map(|points| outlet_angle(surface.triangles(), points));
     assert!((11.0..19.0).contains(&(before - after)), "from {before:.1} to {after:.1} degrees");
+}
+
+#[test]
+fn the_bypass_is_drawn_before_and_after() {
+    let _ = generated_mesh("bypass-0");
+    let picture = gallery("bypass-angle.png");
+    let mut draw = Command::new(project().join("scripts/pictures"));
+    draw.arg("--out").arg(picture.parent().expect("a folder"));
+    succeed(
+        draw.args(["bypass", "--program"]).arg(target().join("debug/examples/skeleton_picture")),
+    );
+    assert!(picture.exists());
 }

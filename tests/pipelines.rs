@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::{read_dir, read_to_string};
 
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Run, Small, project};
+use tombolo_tests::{PATIENCE, Run, Small, gallery, generated_mesh, project};
 
 /// Runs `flow` for some steps with a file of `docs/pipelines`; its report, and what it said.
 fn run(file: &str, steps: u32) -> (Small, Value, String) {
@@ -122,4 +122,22 @@ fn forces_and_triggers_are_seen_outside() {
     let (small, _, _) = run("stop-on-divergence.json", 21);
     let there = (0..21).filter(|cycle| small.path(&format!("out/state-{cycle:06}.vtu")).exists());
     assert_eq!(there.collect::<Vec<_>>(), [10, 15, 20]);
+}
+
+#[test]
+fn the_pictures_for_a_paper_are_drawn() {
+    let _ = generated_mesh("channel-60k");
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().display().to_string();
+    let files = ["examples/flow/cases/nozzle.json", "docs/pipelines/pictures-for-a-paper.json"]
+        .map(|file| project().join(file).display().to_string());
+    let arguments = ["--case", &files[0], "--pipelines", &files[1], "--out", &out];
+    let (status, text) =
+        Run::flow(&[&arguments[..], &["--headless", "--steps", "60"]].concat()).finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    for (drawn, shown) in
+        [("arrows", "nozzle.png"), ("cut", "nozzle-cut.png"), ("wall", "nozzle-wall.png")]
+    {
+        std::fs::copy(folder.path().join(format!("{drawn}.png")), gallery(shown)).expect("drawn");
+    }
 }

@@ -25,6 +25,7 @@
 mod catalyst;
 mod codec;
 mod codec_cases;
+mod desk;
 mod extract;
 mod growth;
 mod measure;

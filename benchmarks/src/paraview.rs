@@ -1,7 +1,6 @@
 //! What a run pays for being followed in ParaView.
 //!
-//! ParaView has the lowest priority, because a real one has a machine of its own; on a machine of few
-//! cores it takes some processor time from the run all the same.
+//! ParaView has a core of its own ([`Desk`]), as a real one has a machine of its own.
 
 use std::error::Error;
 use std::fs::File;
@@ -11,6 +10,7 @@ use std::time::Duration;
 
 use tombolo_tests::{project, target};
 
+use crate::desk::Desk;
 use crate::measure::Times;
 use crate::overhead::SMALL;
 use crate::peer;
@@ -30,6 +30,7 @@ const BEGINNING: Duration = Duration::from_secs(120);
 pub fn run() -> Result<Report, Box<dyn Error>> {
     peer::run(Command::new(project().join("scripts/python")).arg("--release"))?;
     peer::run(Command::new(project().join("scripts/fetch-paraview")).arg("--program"))?;
+    let desk = Desk::set_apart()?;
     let mut run = Run::new(SMALL)?;
     run.steps(|| true, [TURN; 2])?;
     let link = run.link()?;
@@ -37,7 +38,7 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
     let mut ratios = Times::new();
     for _ in 0..ROUNDS {
         let without = run.steps(|| true, [TURN, 2 * TURN])?.whole.median();
-        let paraview = Paraview::follow(&link)?;
+        let paraview = Paraview::follow(&link, &desk)?;
         run.steps(|| paraview.shown().is_ok_and(|shown| shown > 0), [Duration::ZERO, BEGINNING])?;
         let before = paraview.shown()?;
         let with = run.steps(|| true, [TURN, 2 * TURN])?.whole.median();
@@ -51,7 +52,10 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
     let rows = vec![
         Row::new("median step, nobody connected", alone.median()),
         Row::new(
-            format!("the same, followed in ParaView: {shown} steps shown in {seconds} s, or more"),
+            format!(
+                "the same, followed in ParaView {}: {shown} steps shown in {seconds} s, or more",
+                desk.place()
+            ),
             followed.median(),
         ),
     ];
@@ -67,14 +71,12 @@ struct Paraview {
 }
 
 impl Paraview {
-    fn follow(link: &str) -> Result<Self, Box<dyn Error>> {
+    fn follow(link: &str, desk: &Desk) -> Result<Self, Box<dyn Error>> {
         let clients = project().join("clients/paraview");
         let paths = [project().join("bindings/python/python"), clients.join("debian"), clients];
         let printed = tempfile::tempfile()?;
-        let mut command = Command::new("nice");
+        let mut command = desk.command(target().join("third-party/paraview/pvpython"));
         command
-            .args(["-n", "19"])
-            .arg(target().join("third-party/paraview/pvpython"))
             .arg(project().join("benchmarks/peers/follow_in_paraview.py"))
             // Not among its arguments: the link is a secret.
             .env("TOMBOLO_LINK", link)

@@ -2,15 +2,14 @@
 //! orders and large ones; and how soon the mesh moves.
 //!
 //! The viewers are a process of their own ([`crate::service_viewers`]), so that the memory measured
-//! here is the run's, and one of the lowest priority, because a real one has a machine of its own. On a
-//! machine of few cores they take some processor time from the run all the same.
+//! here is the run's, and one with a core of its own ([`Desk`]), as real ones have machines of their own.
 
 use std::{
     collections::HashMap,
     error::Error,
     fs::File,
     io::{Read, Seek},
-    process::{Child, Command},
+    process::Child,
     time::{Duration, Instant, SystemTime},
 };
 
@@ -31,6 +30,7 @@ use tombolo::{
 use tombolo_flow::{Motion, Solver};
 
 use crate::{
+    desk::Desk,
     measure::{Times, memory},
     overhead::{LARGE, SMALL, TIME_STEP, channel, solver},
     peer,
@@ -180,16 +180,21 @@ impl Run {
     }
 
     /// Steps beside viewers in a process of their own, until that has ended.
-    fn beside(&mut self, task: &Task, most: Duration) -> Result<(Steps, Seen), Box<dyn Error>> {
+    fn beside(
+        &mut self,
+        desk: &Desk,
+        task: &Task,
+        most: Duration,
+    ) -> Result<(Steps, Seen), Box<dyn Error>> {
         let link = self.link()?;
-        let mut viewers = Viewers::start(&link, task)?;
+        let mut viewers = Viewers::start(&link, task, desk)?;
         let steps = self.steps(|| viewers.has_ended(), [Duration::ZERO, most])?;
         Ok((steps, viewers.seen()?))
     }
 
     /// Seconds from each of so many orders to the first mesh that it moved.
-    fn delays(&mut self, count: usize) -> Result<Times, Box<dyn Error>> {
-        let (_, seen) = self.beside(&Task::Latency { count }, MOST)?;
+    fn delays(&mut self, desk: &Desk, count: usize) -> Result<Times, Box<dyn Error>> {
+        let (_, seen) = self.beside(desk, &Task::Latency { count }, MOST)?;
         let delay = |(id, at): &(String, f64)| self.moved.get(id).map(|moved| moved - at);
         Ok(seen.sent.iter().filter_map(delay).collect())
     }
@@ -204,10 +209,8 @@ struct Viewers {
 }
 
 impl Viewers {
-    fn start(link: &str, task: &Task) -> Result<Self, Box<dyn Error>> {
-        // They stand for other machines: what they compute is not to be taken from the run.
-        let mut command = Command::new("nice");
-        command.args(["-n", "19"]).arg(std::env::current_exe()?);
+    fn start(link: &str, task: &Task, desk: &Desk) -> Result<Self, Box<dyn Error>> {
+        let mut command = desk.command(std::env::current_exe()?);
         let task = serde_json::to_string(task)?;
         let printed = tempfile::tempfile()?;
         // Not among its arguments: the link is a secret.
@@ -260,11 +263,12 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
         rows.push(Row { part, what, value, unit });
     };
 
+    let desk = Desk::set_apart()?;
     let mut run = Run::new(SMALL)?;
     run.steps(|| true, alone)?;
     let before = run.steps(|| true, alone)?;
     let task = Task::Watch { fast: 35, slow: 10, deaf: 5, seconds };
-    let (beside, seen) = run.beside(&task, MOST)?;
+    let (beside, seen) = run.beside(&desk, &task, MOST)?;
     let after = run.steps(|| true, alone)?;
     let quiet = f64::midpoint(before.whole.median(), after.whole.median());
     let quiet_execute = f64::midpoint(before.execute.median(), after.execute.median());
@@ -295,7 +299,7 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
     ));
 
     let count = if short { 20 } else { 100 };
-    let delays = run.delays(count)?;
+    let delays = run.delays(&desk, count)?;
     for (what, value) in spread(&delays) {
         push("order to first moved mesh, 60 840 cells", what, value, "s");
     }
@@ -306,7 +310,7 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
         ("small orders", Task::Small { count: if short { 50 } else { 1000 } }),
         ("orders of 0.94 MB", Task::Large { count: if short { 12 } else { 60 }, vertices }),
     ] {
-        let (steps, seen) = run.beside(&task, MOST)?;
+        let (steps, seen) = run.beside(&desk, &task, MOST)?;
         let rejected = seen.rejected.len();
         if let Some(reason) = seen.rejected.first().filter(|_| rejected * 10 > seen.sent.len()) {
             return Err(format!(
@@ -335,7 +339,7 @@ pub fn run(short: bool) -> Result<Report<Row>, Box<dyn Error>> {
 
     let mut run = Run::new(LARGE)?;
     run.steps(|| true, alone)?;
-    let delays = run.delays(count)?;
+    let delays = run.delays(&desk, count)?;
     for (what, value) in spread(&delays) {
         push("order to first moved mesh, 486 720 cells", what, value, "s");
     }

@@ -1,8 +1,9 @@
 """What the studies of this folder share: a flow that runs, answers that have settled, and two ways to ask for them.
 
-A study asks for the pressure drop at one shape after another. `Running` asks one flow that goes on, and changes its
-shape by an order. `Restarted` asks a flow that begins anew in each shape. Both wait by the same `Criterion`. For a
-study of your own copy this file and one that uses it: that one says what the shapes are, and how they are searched.
+A study asks for a `Quantity`, the pressure drop or the flow rate, at one shape after another. `Running` asks one flow
+that goes on, and changes its shape by an order. `Restarted` asks a flow that begins anew in each shape. Both wait by
+the same `Criterion`. For a study of your own copy this file and one that uses it: that one says what the shapes are,
+and how they are searched.
 """
 
 from __future__ import annotations
@@ -23,16 +24,6 @@ import numpy as np
 import tombolo
 from numpy.typing import NDArray
 
-DROP = {
-    "name": "study",
-    "every": {"steps": 1},
-    "stages": [
-        {"surface": {}},
-        {"integrate": {"name": "inlet", "features": ["inlet"], "field": "pressure", "unit": "Pa"}},
-        {"integrate": {"name": "outlet", "features": ["outlet"], "field": "pressure", "unit": "Pa"}},
-        {"difference": {"name": "drop", "of": "inlet.mean", "minus": "outlet.mean", "unit": "Pa"}},
-    ],
-}
 SHAPE = {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"guard": {"min_scaled_jacobian": 0.02}}]}
 
 Edits = Callable[[float], list[dict[str, Any]]]
@@ -92,8 +83,52 @@ def begun(
         process.stdout.close()
 
 
+class Quantity(NamedTuple):
+    """What a study asks a flow for.
+
+    Attributes
+    ----------
+    name, unit : str
+        As a picture has them on its axis.
+    monitor : str
+        Its name among the monitors of the pipeline.
+    stages : list of dict
+        The pipeline that measures it at each step.
+    """
+
+    name: str
+    unit: str
+    monitor: str
+    stages: Sequence[Mapping[str, Any]]
+
+
+DROP = Quantity(
+    "pressure drop",
+    "Pa",
+    "drop",
+    [
+        {"surface": {}},
+        {"integrate": {"name": "inlet", "features": ["inlet"], "field": "pressure", "unit": "Pa"}},
+        {"integrate": {"name": "outlet", "features": ["outlet"], "field": "pressure", "unit": "Pa"}},
+        {"difference": {"name": "drop", "of": "inlet.mean", "minus": "outlet.mean", "unit": "Pa"}},
+    ],
+)
+RATE = Quantity(
+    "flow rate",
+    "m3/s",
+    "outlet.flow_rate",
+    [
+        {"surface": {}},
+        {"integrate": {"name": "outlet", "features": ["outlet"], "vector": "velocity", "units": {"flow_rate": "m3/s"}}},
+    ],
+)
+
+
 class Criterion(NamedTuple):
-    """When a flow has settled: over `window` steps its drop has changed by less than `change` of the reference's."""
+    """When a flow has settled.
+
+    Over `window` steps the quantity has changed by less than `change` of what it is in the reference shape.
+    """
 
     window: int
     change: float
@@ -114,6 +149,8 @@ class Flows(NamedTuple):
         When a flow has settled.
     timeout : float
         Seconds for one answer, at most.
+    quantity : Quantity
+        What is asked for.
     """
 
     program: Path
@@ -122,6 +159,7 @@ class Flows(NamedTuple):
     schedule: int
     criterion: Criterion
     timeout: float = 600.0
+    quantity: Quantity = DROP
 
     @contextlib.contextmanager
     def begun(self, edits: Sequence[Mapping[str, Any]] = ()) -> Iterator[tombolo.Run]:
@@ -132,7 +170,8 @@ class Flows(NamedTuple):
             ended.enter_context(terminable())
             folder = Path(ended.enter_context(tempfile.TemporaryDirectory()))
             case = self.shaped(edits, folder)
-            link = ended.enter_context(begun(self.program, case, configuration(DROP, SHAPE), orders, folder))
+            measured = {"name": "study", "every": {"steps": 1}, "stages": self.quantity.stages}
+            link = ended.enter_context(begun(self.program, case, configuration(measured, SHAPE), orders, folder))
             run = ended.enter_context(tombolo.connect(link))
             yield run
 
@@ -152,44 +191,43 @@ class Flows(NamedTuple):
         return file
 
     def settled(self, run: tombolo.Run, since: int, scale: Optional[float]) -> tuple[float, int]:
-        """The pressure drop, once it has settled behind the cycle `since`; and the cycle at which it had.
+        """The quantity, once it has settled behind the cycle `since`; and the cycle at which it had.
 
-        `scale` is the drop of the reference, None where it is that which is asked for.
+        `scale` is the quantity of the reference, None where it is that which is asked for.
         """
         window, change = self.criterion
 
         def found() -> Optional[tuple[float, int]]:
-            cycles, drops = history(run)
-            cycles, drops = cycles[cycles > since], drops[cycles > since]
-            if len(drops) < window:
+            cycles, results = self.history(run)
+            cycles, results = cycles[cycles > since], results[cycles > since]
+            if len(results) < window:
                 return None
-            windows = np.lib.stride_tricks.sliding_window_view(drops, window)
+            windows = np.lib.stride_tricks.sliding_window_view(results, window)
             allowed = change * np.abs(windows.mean(axis=1) if scale is None else scale)
             steady = np.flatnonzero(np.ptp(windows, axis=1) <= allowed)
             if not len(steady):
                 return None
             end = steady[0] + window - 1
-            return float(drops[end]), int(cycles[end])
+            return float(results[end]), int(cycles[end])
 
         answer = run.wait_for(found, self.timeout)
         assert answer is not None
         return answer
 
-
-def history(run: tombolo.Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The cycles so far, and the pressure drop at each."""
-    table = run.monitors.get("study")
-    if table is None:
-        return np.empty(0), np.empty(0)
-    drops = table["drop"]
-    return table["cycle"][: len(drops)], drops
+    def history(self, run: tombolo.Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The cycles so far, and the quantity at each."""
+        table = run.monitors.get("study")
+        if table is None:
+            return np.empty(0), np.empty(0)
+        results = table[self.quantity.monitor]
+        return table["cycle"][: len(results)], results
 
 
 class Answer(NamedTuple):
-    """The pressure drop at a value of what is varied, and the steps that it took to settle."""
+    """The quantity at a value of what is varied, and the steps that it took to settle."""
 
     value: float
-    drop: float
+    result: float
     steps: int
 
 
@@ -201,11 +239,11 @@ class Study:
     name : str
         The way it asks.
     reference : float
-        The drop of the shape that the case begins with: what "settled" is measured by.
+        The quantity in the shape that the case begins with: what "settled" is measured by.
     answers : list of Answer
         What it was told, in order.
     histories : list
-        Of each flow the cycles and the drops.
+        Of each flow the cycles and the quantity at each.
     spent : int
         The steps of all flows.
     """
@@ -238,19 +276,19 @@ class Running(Study):
         super().__init__(flows, edits)
         self.run = run
         self.reference, self.start = flows.settled(run, 0, None)
-        self.spent, self.histories = self.start, [history(run)]
+        self.spent, self.histories = self.start, [flows.history(run)]
 
-    def drop(self, value: float) -> float:
-        """Ask for the drop at a value."""
+    def ask(self, value: float) -> float:
+        """Ask for the quantity at a value."""
         # A whole stack replaces the orders before it: shapes do not add up.
         schedule = {"steps": self.flows.schedule, "ease": "smooth"}
         order = {"stack": self.edits(value), "schedule": schedule}
         applied = self.run.order(order).wait(self.flows.timeout).cycle_applied
         assert applied is not None
-        drop, cycle = self.flows.settled(self.run, applied + self.flows.schedule, self.reference)
-        self.answers.append(Answer(value, drop, cycle - applied))
-        self.spent, self.histories = cycle, [history(self.run)]
-        return drop
+        result, cycle = self.flows.settled(self.run, applied + self.flows.schedule, self.reference)
+        self.answers.append(Answer(value, result, cycle - applied))
+        self.spent, self.histories = cycle, [self.flows.history(self.run)]
+        return result
 
 
 class Restarted(Study):
@@ -262,15 +300,15 @@ class Restarted(Study):
         super().__init__(flows, edits)
         self.reference = reference
 
-    def drop(self, value: float) -> float:
-        """Ask for the drop at a value."""
+    def ask(self, value: float) -> float:
+        """Ask for the quantity at a value."""
         with self.flows.begun(self.edits(value)) as run:
-            drop, cycle = self.flows.settled(run, 0, self.reference)
-            cycles, drops = history(run)
-        self.answers.append(Answer(value, drop, cycle))
-        self.histories.append((cycles[cycles <= cycle], drops[cycles <= cycle]))
+            result, cycle = self.flows.settled(run, 0, self.reference)
+            cycles, results = self.flows.history(run)
+        self.answers.append(Answer(value, result, cycle))
+        self.histories.append((cycles[cycles <= cycle], results[cycles <= cycle]))
         self.spent += cycle
-        return drop
+        return result
 
 
 class Comparison(NamedTuple):
@@ -285,6 +323,11 @@ class Comparison(NamedTuple):
         """Both ways."""
         return self.running, self.restarted
 
+    @property
+    def quantity(self) -> Quantity:
+        """What both have asked for."""
+        return self.running.flows.quantity
+
 
 def compare(flows: Flows, edits: Edits, search: Search) -> Comparison:
     """Makes a study in both ways.
@@ -296,35 +339,35 @@ def compare(flows: Flows, edits: Edits, search: Search) -> Comparison:
     edits : callable
         The edits that make the shape of a value, measured from the reference.
     search : callable
-        Finds a value, by a function that gives the drop at a value, and the drop of the reference.
+        Finds a value, by a function that gives the quantity at a value, and the quantity of the reference.
     """
     with flows.begun() as run:
         running = Running(run, flows, edits)
-        first = search(running.drop, running.reference)
+        first = search(running.ask, running.reference)
     restarted = Restarted(flows, edits, running.reference)
-    return Comparison(running, restarted, (first, search(restarted.drop, running.reference)))
+    return Comparison(running, restarted, (first, search(restarted.ask, running.reference)))
 
 
 def least(lower: float, upper: float, tolerance: float) -> Search:
-    """A search for the value of the least drop between two bounds, by Brent's method."""
+    """A search for the value at which the quantity is least between two bounds, by Brent's method."""
     from scipy.optimize import minimize_scalar
 
-    def find(drop: Ask, _: float) -> float:
+    def find(ask: Ask, _: float) -> float:
         options = {"xatol": tolerance}
-        return float(minimize_scalar(drop, bounds=(lower, upper), method="bounded", options=options).x)
+        return float(minimize_scalar(ask, bounds=(lower, upper), method="bounded", options=options).x)
 
     return find
 
 
 def sampled(lower: float, upper: float, trials: int) -> Search:
-    """A search for the value of the least drop by Optuna, which asks so often, and takes no answer for exact."""
+    """A search for the value at which the quantity is least by Optuna, which takes no answer for exact."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
 
-    def find(drop: Ask, _: float) -> float:
+    def find(ask: Ask, _: float) -> float:
         search = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=1))
-        search.optimize(lambda trial: drop(trial.suggest_float("value", lower, upper)), n_trials=trials)
+        search.optimize(lambda trial: ask(trial.suggest_float("value", lower, upper)), n_trials=trials)
         return float(search.best_params["value"])
 
     return find
@@ -342,42 +385,45 @@ def arguments(
     )
     parser.add_argument("--tolerance", type=float, default=tolerance, help="of what is searched for")
     parser.add_argument("--schedule", type=int, default=schedule, help="steps from one shape to the next")
-    parser.add_argument("--window", type=int, default=criterion.window, help="steps that settled drops are steady for")
+    parser.add_argument("--window", type=int, default=criterion.window, help="steps that it has to be steady for")
     parser.add_argument(
-        "--change", type=float, default=criterion.change, help="by which they may change, in parts of the reference's"
+        "--change", type=float, default=criterion.change, help="by which it may change, in parts of the reference's"
     )
     parser.add_argument("--timeout", type=float, default=600, help="seconds for one answer at most")
-    parser.add_argument("--plot", type=Path, help="a picture of the drop over the steps, by matplotlib")
+    parser.add_argument("--plot", type=Path, help="a picture of what was measured over the steps, by matplotlib")
     return parser
 
 
 def bounds(parser: argparse.ArgumentParser, lower: float, upper: float, meaning: str) -> None:
-    """What studies that look for the least drop can be told too."""
+    """What studies that look for the least can be told too."""
     parser.add_argument("--bounds", type=float, nargs=2, default=(lower, upper), help=meaning)
     parser.add_argument("--trials", type=int, help="search by Optuna, where that is installed, with so many answers")
 
 
 def search(given: argparse.Namespace) -> Search:
-    """The search for the least drop that the command line asks for."""
+    """The search for the least that the command line asks for."""
     lower, upper = given.bounds
     return sampled(lower, upper, given.trials) if given.trials else least(lower, upper, given.tolerance)
 
 
-def flows(given: argparse.Namespace) -> Flows:
+def flows(given: argparse.Namespace, quantity: Quantity = DROP) -> Flows:
     """The flows that the command line asks for."""
     parameters = {name: float(value) for name, value in given.set}
     criterion = Criterion(given.window, given.change)
-    return Flows(given.flow, given.case, parameters, given.schedule, criterion, given.timeout)
+    return Flows(given.flow, given.case, parameters, given.schedule, criterion, given.timeout, quantity)
 
 
 def tell(comparison: Comparison, name: str) -> None:
     """Prints what came out; `name` is what was varied."""
     running, restarted, values = comparison
-    print(f"drop of the reference {running.reference:.3f} Pa after {running.start} steps")
+    quantity = comparison.quantity
+    print(f"{quantity.name} of the reference {running.reference:.4g} {quantity.unit} after {running.start} steps")
     for way, value in zip(comparison.studies, values):
         print(f"{way.name}: {name} {value:.4f} after {len(way.answers)} answers and {way.spent} steps")
         for answer in way.answers:
-            print(f"  {name} {answer.value:.4f}: {answer.drop:.3f} Pa, settled after {answer.steps} steps")
+            print(
+                f"  {name} {answer.value:.4f}: {answer.result:.4g} {quantity.unit}, settled after {answer.steps} steps"
+            )
     print(f"steps, running / anew: {running.spent / restarted.spent:.2f} in all", end=", ")
     print(f"{running.mean / restarted.mean:.2f} for an answer, in the mean")
 
@@ -394,7 +440,7 @@ def conclude(
 
 
 def plot(comparison: Comparison, name: str, file: Path, wanted: Optional[float] = None) -> None:
-    """Draws the drop over the steps that were spent, and over what was varied."""
+    """Draws the quantity over the steps that were spent, and over what was varied."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -405,14 +451,16 @@ def plot(comparison: Comparison, name: str, file: Path, wanted: Optional[float] 
     )
     for way, color, marker in zip(comparison.studies, ("tab:blue", "tab:orange"), "ox"):
         spent = 0
-        for cycles, pressures in way.histories:
-            time.plot(spent + cycles, pressures, color=color, linewidth=1)
+        for cycles, results in way.histories:
+            time.plot(spent + cycles, results, color=color, linewidth=1)
             spent += int(cycles[-1])
-        values, drops, _ = zip(*way.answers)
-        shape.plot(values, drops, marker, color=color, markerfacecolor="none", label=way.name)
-    answers = [answer.drop for way in comparison.studies for answer in way.answers] + [comparison.running.reference]
+        values, results, _ = zip(*way.answers)
+        shape.plot(values, results, marker, color=color, markerfacecolor="none", label=way.name)
+    answers = [answer.result for way in comparison.studies for answer in way.answers] + [comparison.running.reference]
     room = 0.3 * np.ptp(answers)
-    time.set(xlabel="solver steps spent", ylabel="pressure drop [Pa]", xlim=(0, None))
+    time.set(
+        xlabel="solver steps spent", ylabel=f"{comparison.quantity.name} [{comparison.quantity.unit}]", xlim=(0, None)
+    )
     # The peaks while a mesh moves would leave no room for the rest.
     time.set(ylim=(min(answers) - room, max(answers) + room))
     shape.set(xlabel=name)

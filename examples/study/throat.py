@@ -28,9 +28,9 @@ def throat(height: float) -> list[dict[str, Any]]:
 def search(times: float, tolerance: float) -> study.Search:
     """A search between a half and the whole for the height at which the drop is so many times the reference's."""
 
-    def find(drop: study.Ask, reference: float) -> float:
+    def find(ask: study.Ask, reference: float) -> float:
         wanted = times * reference
-        return float(scipy.optimize.brentq(lambda height: drop(height) - wanted, 0.5, 1.0, xtol=tolerance))
+        return float(scipy.optimize.brentq(lambda height: ask(height) - wanted, 0.5, 1.0, xtol=tolerance))
 
     return find
 
@@ -42,7 +42,7 @@ def main() -> int:
     given = parser.parse_args()
     comparison = study.compare(study.flows(given), throat, search(given.times, given.tolerance))
     wanted = given.times * comparison.running.reference
-    print(f"wanted: {wanted:.3f} Pa")
+    print(f"wanted: {wanted:.4g} {study.DROP.unit}")
     return study.conclude(comparison, given, "height", "of the reference's", wanted)
 
 

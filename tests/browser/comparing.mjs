@@ -94,7 +94,7 @@ const steps = [
     await page.click("#compare");
     await viewer.drawn();
     check(/^before “Throat: height × 0\.7”/.test(await viewer.text("#before .caption")), "the other picture does not say what it came before");
-    await viewer.picture("compared");
+    await viewer.picture("compared", "compared.png");
     await clean("side by side");
     const [left, right] = await page.evaluate(() => ["before", "stage"].map((id) => document.getElementById(id).getBoundingClientRect().width));
     check(Math.abs(left - right) < 4, `the pictures are ${left} and ${right} wide`);

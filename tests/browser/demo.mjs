@@ -70,7 +70,7 @@ const look = () => viewer.look();
 const extent = () => viewer.extent(HANDLE, 2);
 const until = (what, condition) => viewer.until(what, condition);
 const drawn = () => viewer.drawn();
-const picture = (name) => viewer.picture(name);
+const picture = (name, shown) => viewer.picture(name, shown);
 
 /** How many pixels of the column at `x` the shape covers, all that has come being drawn. */
 async function silhouette(x) {
@@ -266,7 +266,7 @@ const steps = [
     await picture("pinched-side");
     await page.click('[data-camera="reset"]');
     await drawn();
-    await picture("pinched");
+    await picture("pinched", "viewer.png");
   }],
   ["undo brings the old shape back", async () => {
     await page.click('[data-camera="0"]');

@@ -13,7 +13,7 @@ const browser = await launch();
 const viewer = await Viewer.open(browser, "handles", { hasTouch: true });
 const { page } = viewer;
 const drawn = () => viewer.drawn();
-const picture = (name) => viewer.picture(name);
+const picture = (name, shown) => viewer.picture(name, shown);
 const values = (label) => Promise.all(["x", "y", "z"].map(async (axis) => Number(await page.inputValue(`.object:not([hidden]) input[aria-label$="${label} ${axis}"]`))));
 const preview = async () => {
   await page.waitForFunction(() => window.tombolo.preview.state === "shown");
@@ -48,7 +48,7 @@ const steps = [
     check(place, `${HANDLE} cannot be seen`);
     await page.mouse.click(...place);
     await gizmo("arrow z");
-    await picture("gizmo");
+    await picture("gizmo", "gizmo.png");
   }],
   ["the box and a typed value scale by exactly 0.5", async () => {
     await drag(await gizmo("box z"), [0, 12]);

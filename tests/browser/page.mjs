@@ -4,13 +4,15 @@
  *
  * TOMBOLO_URL          the link that the run printed (needed)
  * TOMBOLO_SCREENSHOTS  the directory for the screenshots (default: a new one in the directory for temporary files)
+ * TOMBOLO_GALLERY      the directory for those of docs/gallery.md (default: target/gallery)
  * TOMBOLO_SECONDS      how long to wait for anything, which only a fault makes it come to (default 600)
  * CHROMIUM             the browser (default /usr/bin/chromium)
  */
-import { mkdirSync, mkdtempSync, readFileSync } from "node:fs";
+import { copyFileSync, mkdirSync, mkdtempSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 
 const require = createRequire(new URL("../../viewer/package.json", import.meta.url));
 const { chromium } = require("playwright-core");
@@ -29,7 +31,8 @@ if (!link) {
 }
 export const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
 export const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
-mkdirSync(screenshots, { recursive: true });
+const gallery = process.env.TOMBOLO_GALLERY ?? fileURLToPath(new URL("../../target/gallery", import.meta.url));
+for (const directory of [screenshots, gallery]) mkdirSync(directory, { recursive: true });
 
 export const launch = () => chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
@@ -84,8 +87,11 @@ export class Viewer {
     return this.page.locator(selector).innerText();
   }
 
-  picture(name) {
-    return this.page.screenshot({ path: join(screenshots, `${this.name}-${String(++this.pictures).padStart(2, "0")}-${name}.png`) });
+  /** Keeps what the page looks like; also as the picture `shown` of the gallery, where that is given. */
+  async picture(name, shown) {
+    const path = join(screenshots, `${this.name}-${String(++this.pictures).padStart(2, "0")}-${name}.png`);
+    await this.page.screenshot({ path });
+    if (shown) copyFileSync(path, join(gallery, shown));
   }
 
   /** Waits until something that is evaluated in the page holds; gives back its value. */

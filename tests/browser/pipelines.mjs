@@ -85,7 +85,7 @@ const steps = [
     await anna.holds("what a stream may say", () => document.querySelectorAll(".cm-tooltip-autocomplete li").length > 0);
     check((await options()).includes("error"), `a stream may say ${await options()}`);
     await anna.holds("what it means", () => document.querySelector(".cm-completionInfo")?.textContent.length > 20);
-    await anna.picture("completion");
+    await anna.picture("completion", "pipelines.png");
     await page.keyboard.press("Escape");
     check(await page.locator(".cm-tooltip-autocomplete").count() === 0, "Escape leaves the list open");
     check(await page.locator("#pipeline-editor").isVisible(), "Escape leaves the editor with the list");

@@ -58,3 +58,14 @@ mod book {
     #[doc = include_str!("../../docs/instrument-your-solver.md")]
     struct InstrumentYourSolver;
 }
+
+/// Where a test leaves a picture of `docs/gallery.md`, for `scripts/pictures gallery`.
+///
+/// # Panics
+/// Where the folder cannot be made.
+#[must_use]
+pub fn gallery(picture: &str) -> PathBuf {
+    let folder = target().join("gallery");
+    std::fs::create_dir_all(&folder).expect("the target directory can be written");
+    folder.join(picture)
+}

@@ -20,6 +20,8 @@ PROJECT = Path(__file__).parents[3]
 EXAMPLES = PROJECT / "examples"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", PROJECT / "target"))
 FLOW = TARGET / "debug/flow"
+GALLERY = TARGET / "gallery"
+GALLERY.mkdir(parents=True, exist_ok=True)
 
 
 def box(count, dtype=float):

@@ -1,5 +1,6 @@
 """Solvers that others wrote: an order is carried out, the physics is known, and the undo is exact."""
 
+import importlib.util
 import json
 import os
 import signal
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import EXAMPLES, FLOW, debian, load, study
+from conftest import EXAMPLES, FLOW, GALLERY, debian, load, study
 from tombolo import _native
 
 
@@ -111,11 +112,31 @@ def test_a_throat_is_found_on_a_running_flow_and_with_restarts(small_nozzle):
 
     assert found.values[0] == pytest.approx(found.values[1], abs=5e-3)
     for way in found.studies:
-        assert way.answers[-1].drop == pytest.approx(1.5 * found.running.reference, rel=0.02)
+        assert way.answers[-1].result == pytest.approx(1.5 * found.running.reference, rel=0.02)
     # From a shape nearby the flow settles sooner than from rest.
     before, after = found.running.answers[-2:]
     assert abs(after.value - before.value) < 0.05
     assert after.steps < found.restarted.answers[-1].steps
+
+
+def test_the_throat_for_a_flow_rate_is_found_on_a_running_flow_and_with_restarts(small_case):
+    pytest.importorskip("scipy")
+    flow_rate = load("study/flow_rate.py")
+    case = small_case("nozzle-pressure", "channel-5k")
+    flows = study.Flows(FLOW, case, {}, flow_rate.SCHEDULE, flow_rate.CRITERION, timeout=300, quantity=study.RATE)
+    found = study.compare(flows, flow_rate.throat, flow_rate.search(part=0.8, tolerance=5e-3))
+
+    wanted = 0.8 * found.running.reference
+    assert found.values[0] == pytest.approx(found.values[1], abs=1e-2)
+    for way in found.studies:
+        assert way.answers[-1].result == pytest.approx(wanted, rel=0.02)
+        # The wider the throat, the more passes.
+        rates = [answer.result for answer in sorted(way.answers)]
+        assert rates[0] < wanted < rates[-1]
+    # A fluid that flows already has less to be speeded up.
+    assert found.running.mean < found.restarted.mean
+    if importlib.util.find_spec("matplotlib"):
+        study.plot(found, "height [of the reference's]", GALLERY / "study.png", wanted)
 
 
 def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
@@ -131,13 +152,13 @@ def test_a_widening_is_found_on_a_running_flow_and_with_restarts(small_case):
     assert upper - 0.1 < found.values[0] < upper
     for way in found.studies:
         answers = sorted(way.answers)
-        drops = [answer.drop for answer in answers]
+        drops = [answer.result for answer in answers]
         assert drops == sorted(drops, reverse=True)
         # Some of the pressure comes back, and no more than without friction: twice that of a flat profile.
         for area, drop, _ in answers:
             assert -density * speed**2 * (1 - 1 / area**2) < drop < found.running.reference
     for running, restarted in zip(found.running.answers, found.restarted.answers):
-        assert running.drop == pytest.approx(restarted.drop, abs=5e-3 * found.running.reference)
+        assert running.result == pytest.approx(restarted.result, abs=5e-3 * found.running.reference)
     assert found.running.answers[-1].steps < found.restarted.answers[-1].steps
 
 
@@ -149,13 +170,13 @@ def test_an_angle_is_found_on_a_running_flow_and_with_restarts(small_case):
     found = study.compare(flows, angle.bend, study.least(-10, 10, tolerance=2))
 
     assert found.values[0] == pytest.approx(found.values[1], abs=3)
-    least = [min(answer.drop for answer in way.answers) for way in found.studies]
+    least = [min(answer.result for answer in way.answers) for way in found.studies]
     assert least[0] == pytest.approx(least[1], rel=5e-4)
     for way, value, drop in zip(found.studies, found.values, least):
         # It lies between the bounds, and away from it the drop is more.
         assert -5 < value < 5
         far = [answer for answer in way.answers if abs(answer.value - value) > 4]
-        assert far and all(answer.drop > 1.0005 * drop for answer in far)
+        assert far and all(answer.result > 1.0005 * drop for answer in far)
     assert found.running.mean < 0.9 * found.restarted.mean
 
 
@@ -228,12 +249,12 @@ if ranks.rank == 0:
 """
 
 
-def test_heat_with_dolfinx_on_ranks(tmp_path):
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4] if _native.DISTRIBUTED else [1])
+def test_heat_with_dolfinx_on_ranks(ranks, tmp_path):
     if not Path("/usr/bin/python3").exists() or debian("-c", "import dolfinx").returncode != 0:
         pytest.skip("there is no dolfinx: scripts/setup --distributed")
     squeeze = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -0.2]}}
     orders = json.dumps(commands(squeeze, {"steps": 5, "every": {"steps": 2}}, 30, 70))
-    ranks = 3 if _native.DISTRIBUTED else 1
     begin = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     said = debian("-c", DOLFINX, EXAMPLES / "heat/python", orders, tmp_path, begin=begin, folder=tmp_path)
     assert said.returncode == 0, said.stdout + said.stderr

@@ -274,14 +274,19 @@ def test_why_there_is_no_run_is_told_once_in_plain_vtk(plugin, tmp_path):
     assert "expected http://" in plugin.errors[-1]
 
 
+def paraview(name):
+    """A program of ParaView, and the environment in which it finds the plug-in and the package."""
+    fetched = shutil.which(TARGET / "third-party/paraview" / name)
+    program = os.environ.get(f"TOMBOLO_{name.upper()}") or fetched or shutil.which(name)
+    if program is None:
+        pytest.skip(f"there is no {name}: scripts/fetch-paraview --program")
+    package = Path(tombolo.__file__).parents[1]
+    return program, os.environ | {"PYTHONPATH": f"{package}:{CLIENT}:{CLIENT / 'debian'}"}
+
+
 def pvpython(*arguments):
     """What ParaView's Python says to a script."""
-    fetched = shutil.which(TARGET / "third-party/paraview/pvpython")
-    program = os.environ.get("TOMBOLO_PVPYTHON") or fetched or shutil.which("pvpython")
-    if program is None:
-        pytest.skip("there is no pvpython: scripts/fetch-paraview --program")
-    package = Path(tombolo.__file__).parents[1]
-    environment = os.environ | {"PYTHONPATH": f"{package}:{CLIENT}:{CLIENT / 'debian'}"}
+    program, environment = paraview("pvpython")
     command = [program, *map(str, arguments)]
     said = subprocess.run(command, check=False, env=environment, capture_output=True, text=True, timeout=120)
     text = said.stdout + said.stderr

@@ -1,0 +1,61 @@
+//! Two machines on one: the last core is the engineer's desk, and the run has the others.
+//!
+//! A viewer computes on a machine of its own. On a machine of few cores it would take processor time
+//! from the run, and what the run pays for being watched could not be told from that.
+
+use std::{
+    error::Error,
+    process::{self, Command},
+};
+
+use crate::peer;
+
+/// What goes before a program that runs at the desk.
+#[derive(Clone, Debug)]
+pub struct Desk {
+    /// The last core; none where there is one alone.
+    core: Option<usize>,
+}
+
+impl Desk {
+    /// Keeps this process, and all that it starts, off the core of the desk. Goes before anything else:
+    /// pools of threads are as large as the cores that they find.
+    ///
+    /// # Errors
+    /// Where the program `taskset` is missing or fails.
+    pub fn set_apart() -> Result<Self, Box<dyn Error>> {
+        let last = std::thread::available_parallelism()?.get() - 1;
+        if last == 0 {
+            return Ok(Self { core: None });
+        }
+        let own = process::id().to_string();
+        let cores = format!("0-{}", last - 1);
+        peer::run(Command::new("taskset").args([
+            "--all-tasks",
+            "--pid",
+            "--cpu-list",
+            &cores,
+            &own,
+        ]))?;
+        Ok(Self { core: Some(last) })
+    }
+
+    /// A program on the core of the desk; where there is none, with the lowest priority.
+    pub fn command(&self, program: impl AsRef<std::ffi::OsStr>) -> Command {
+        let (before, arguments) = match self.core {
+            Some(core) => ("taskset", ["--cpu-list".to_owned(), core.to_string()]),
+            None => ("nice", ["-n".to_owned(), "19".to_owned()]),
+        };
+        let mut command = Command::new(before);
+        command.args(arguments).arg(program);
+        command
+    }
+
+    /// Where the desk is, for a report.
+    pub fn place(&self) -> &'static str {
+        match self.core {
+            Some(_) => "on a core of its own",
+            None => "on the core of the run, with the lowest priority",
+        }
+    }
+}

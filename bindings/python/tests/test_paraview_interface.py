@@ -1,0 +1,144 @@
+"""ParaView with its interface, on a screen in memory: it gives a running nozzle an order, and follows it by itself."""
+
+import contextlib
+import os
+import shutil
+import subprocess
+import time
+
+import numpy as np
+import pytest
+import tombolo
+from conftest import FLOW, GALLERY, study, wait
+from test_paraview import CLIENT, SURFACE, paraview
+
+SCREEN = (1152, 768)
+SCRIPT = """
+import os
+from paraview import servermanager, simple
+
+simple.LoadPlugin(os.environ["PLUGIN"], ns=globals())
+link = os.environ["TOMBOLO_LINK"]
+
+
+def tell(*_):
+    cycle = servermanager.Fetch(run).GetFieldData().GetArray("cycle")
+    with open(os.environ["SHOWN"], "a") as file:
+        print(int(cycle.GetValue(0)), file=file)
+
+
+view = simple.GetActiveViewOrCreate("RenderView")
+run = TomboloRun(Link=link, View="surface")
+surface = TomboloSurface(Link=link)
+while True:
+    surface.SMProxy.InvokeCommand("Refresh")
+    run.SMProxy.InvokeCommand("Refresh")
+    surface.UpdatePipeline()
+    run.UpdatePipeline()
+    if servermanager.Fetch(surface).GetNumberOfPoints() and servermanager.Fetch(run).GetNumberOfPoints():
+        break
+display = simple.Show(run, view, "GeometryRepresentation")
+display.Representation = "Surface With Edges"
+simple.ColorBy(display, ("POINTS", "pressure"))
+pinched = TomboloScaleDirection(Input=surface, Features="throat", Fixed="inlet, outlet", Factors=[1, 1, 0.5])
+order = TomboloOrder(Input=pinched, Link=link, Steps=10, Every=2)
+simple.Hide(surface, view)
+order.SMProxy.InvokeCommand("Give")
+order.UpdatePipeline()
+view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [2.1, 0, 0.25], [0, 0, 0], [0, 0, 1]
+view.ResetCamera()
+simple.GetActiveCamera().Zoom(1.6)
+simple.Render()
+run.SMProxy.AddObserver("UpdateDataEvent", tell)
+# From here on the script does nothing: the interface asks for what is new.
+"""
+
+
+def picture(file):
+    """What a screen of Xvfb shows, whose memory is a file in the format of `xwd`."""
+    data = file.read_bytes()
+    words = np.frombuffer(data, ">u4", 25)
+    start, width, height, line, colors = (int(words[index]) for index in (0, 4, 5, 12, 19))
+    rows = np.frombuffer(data, np.uint8, line * height, start + 12 * colors).reshape(height, line)
+    return rows[:, : 4 * width].reshape(height, width, 4)[:, :, 2::-1]
+
+
+@pytest.fixture
+def screen(tmp_path):
+    """A screen in memory: its name, and the file that it is."""
+    if not shutil.which("Xvfb"):
+        pytest.skip("there is no Xvfb: scripts/setup --distributed")
+    folder = tmp_path / "screen"
+    folder.mkdir()
+    read, write = os.pipe()
+    # It takes a number that is free, and tells it.
+    size = "x".join(map(str, SCREEN))
+    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{size}x24", "-fbdir", folder, "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as server:
+        os.close(write)
+        try:
+            with os.fdopen(read) as told:
+                yield f":{told.readline().strip()}", folder / "Xvfb_screen0"
+        finally:
+            server.terminate()
+
+
+@contextlib.contextmanager
+def interface(script, display, folder, **variables):
+    """ParaView with its interface runs a script; it is ended behind the block."""
+    program, environment = paraview("paraview")
+    environment |= {"HOME": str(folder), "XDG_RUNTIME_DIR": str(folder), "DISPLAY": display, **variables}
+    # It would greet its user before all else.
+    release = subprocess.run([program, "--version"], env=environment, capture_output=True, text=True, check=True)
+    settings = folder / f".config/ParaView/ParaView{release.stdout.split()[-1]}.ini"
+    settings.parent.mkdir(parents=True)
+    settings.write_text("[General]\nGeneralSettings.ShowWelcomeDialog=false\n")
+    (folder / "script.py").write_text(script)
+    command = [program, f"--script={folder / 'script.py'}"]
+    with (
+        open(folder / "said.txt", "w") as said,
+        subprocess.Popen(command, env=environment, stdout=said, stderr=said) as process,
+    ):
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_the_interface_follows_a_run_and_gives_it_an_order(small_nozzle, screen, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    display, memory = screen
+    shown, home = tmp_path / "shown.txt", tmp_path / "home"
+    home.mkdir(0o700)
+
+    def cycles():
+        lines = shown.read_text().splitlines() if shown.exists() else []
+        return [int(line) for line in lines]
+
+    pipelines = study.configuration(SURFACE, study.SHAPE)
+    with (
+        study.begun(FLOW, small_nozzle, pipelines, [], tmp_path) as link,
+        tombolo.connect(link) as run,
+    ):
+        variables = {"PLUGIN": str(CLIENT / "tombolo_paraview.py"), "TOMBOLO_LINK": str(link), "SHOWN": str(shown)}
+        with interface(SCRIPT, display, home, **variables) as process:
+            said = home / "said.txt"
+            wait(lambda: process.poll() is not None or "Traceback" in said.read_text() or cycles(), 120)
+            assert process.poll() is None and cycles(), said.read_text()
+            # The order is given in ParaView, and its script has ended: the interface asks for what is new.
+            wait(lambda: [order.status for order in run.orders] == ["applied"], 120)
+            applied = run.orders[0].cycle_applied + 20
+            wait(lambda: cycles()[-1] > applied + 50, 120)
+            # What is fetched is drawn a moment later.
+            time.sleep(1)
+            pixels = picture(memory)
+    assert np.all(np.diff(cycles()) >= 0)
+
+    view = pixels[200:720, 310:1140].astype(int)
+    red = (view[..., 0] > view[..., 2] + 30).any(axis=0)
+    drawn = np.abs(view - view[0, 0]).max(axis=-1) > 40
+    heights = drawn.sum(axis=0)
+    # High at its inlet, which is red, and half as high in its middle.
+    assert red[: len(red) // 3].any()
+    assert heights[len(heights) // 2] < 0.75 * heights.max()
+    image.fromarray(pixels).save(GALLERY / "paraview.png")
