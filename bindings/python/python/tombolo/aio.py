@@ -18,7 +18,7 @@ from ._waiting import Parts, Result, moment_after
 from .errors import CallError
 from .events import check_kinds
 from .orders import Command, Edits, Forecast, Order
-from .run import Run, _text
+from .run import WHEEL, Run, _text, left
 from .run import connect as _connect
 
 if TYPE_CHECKING:
@@ -312,9 +312,9 @@ class AsyncRun:
         """As `Run.link_for`."""
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
-    async def _send(self, send: Callable[[_native.Client], str]) -> str:
+    async def _send(self, send: Callable[[_native.Client], str], timeout: Optional[float] = None) -> str:
         """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
-        await self.drive()
+        await self.drive(timeout)
         # Behind the last wait, on the loop: it only queues.
         return send(self.run._reader.client)
 
@@ -322,8 +322,9 @@ class AsyncRun:
         return await _carry_out(self.run._reader, parts)
 
     async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
-        command = Command(self.run, await self._send(send), task)
-        return await self._carry_out(command._wait(timeout))
+        begin = clock.monotonic()
+        command = Command(self.run, await self._send(send, timeout), task)
+        return await self._carry_out(command._wait(left(begin, timeout)))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """As `Run.set`."""
@@ -352,10 +353,10 @@ class AsyncRun:
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
-    async def drive(self, timeout: float = 8.0) -> None:
+    async def drive(self, timeout: Optional[float] = None) -> None:
         """As `Run.drive`."""
-        until = clock.monotonic() + timeout
-        while not await _in_thread(lambda: self.run._ask_for_wheel(until)):
+        until = clock.monotonic() + (WHEEL if timeout is None else timeout)
+        while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
             pass
 
     async def surface(self) -> Surface:
