@@ -274,8 +274,11 @@ impl Adaptor {
 
     /// Takes an order back that has not begun to move the mesh.
     fn cancel(&mut self, order: &str, source: &Source, moment: Moment) -> Result<(), String> {
-        self.withdraw(order)?;
+        let index = self.withdraw(order)?;
         self.log.cancel(order, moment, format!("cancelled{}", by(source)));
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.say_why(index);
+        }
         Ok(())
     }
 
