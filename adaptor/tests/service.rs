@@ -184,7 +184,7 @@ fn what_waited_behind_an_order_that_is_gone_says_what_it_waits_for_now() {
         }
         viewer.send(&json!({"id": id, "order": order}));
     }
-    let mut waits = |viewer: &mut Viewer, solver: &mut Solver, id: &str, before: &str| {
+    let waits = |viewer: &mut Viewer, solver: &mut Solver, id: &str, before: &str| {
         let expected = format!("order {before}, which came before it");
         solver.step_until_told(viewer, "order", |order| {
             order["id"] == id && order["waits_for"] == *expected
