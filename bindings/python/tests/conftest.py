@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -226,10 +227,10 @@ def run(solver):
 @pytest.fixture
 def connections(monkeypatch):
     """The connections in the background: none is known before a test, and none is left behind it."""
-    known = {}
+    known = weakref.WeakValueDictionary()
     monkeypatch.setattr(background, "_CONNECTIONS", known)
     yield known
-    for connection in known.values():
+    for connection in list(known.values()):
         if connection.run is not None:
             connection.run.close()
 
