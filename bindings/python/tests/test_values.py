@@ -2,6 +2,10 @@
 
 import asyncio
 import copy
+import os
+import subprocess
+import sys
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -248,3 +252,35 @@ def test_a_feature_without_faces_is_told_by_its_name(empty):
     for given in ((POINTS, {"tetra": TETS}, faces), (tombolo.Mesh(POINTS, {"tetra": TETS}, faces=faces),)):
         with pytest.raises(tombolo.MeshError, match="the feature 'lid' has no faces"):
             tombolo.Shaper(*given)
+
+
+CALLER = """
+import numpy as np
+import tombolo
+
+conditions = {"inlet": "inflow"}
+cycle = np.int64(3)
+adaptor = tombolo.Adaptor(conditions=conditions)
+adaptor.execute(cycle, 0.0, 0.1, tombolo.Mesh(np.zeros((3, 3))))
+adaptor.looks_at(cycle, 0.0, 0.1)
+
+
+async def steer(run: tombolo.Run) -> None:
+    run.wait_for_cycle(cycle)
+    run.wait_for_view("skin", after=cycle)
+    run.wait_for_cycle(run.monitors["heat"]["cycle"][-1])
+    run.undo(np.int64(1))
+    order = await run.aio.order([], deadline=np.int64(3))
+    run.order([], replaces=order)
+    await run.aio.cancel(order)
+    await run.aio.wait_for_cycle(cycle)
+"""
+
+
+def test_what_callers_give_has_the_types_that_it_is_said_to_have(tmp_path):
+    pytest.importorskip("mypy")
+    (tmp_path / "caller.py").write_text(CALLER)
+    environment = os.environ | {"MYPYPATH": str(Path(tombolo.__file__).parents[1])}
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path / "cache", "caller.py"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
