@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-import weakref
 from pathlib import Path
 
 import numpy as np
@@ -227,7 +226,7 @@ def run(solver):
 @pytest.fixture
 def connections(monkeypatch):
     """The connections in the background: none is known before a test, and none is left behind it."""
-    known = weakref.WeakValueDictionary()
+    known = type(background._CONNECTIONS)()
     monkeypatch.setattr(background, "_CONNECTIONS", known)
     yield known
     for connection in list(known.values()):
