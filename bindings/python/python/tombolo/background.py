@@ -91,7 +91,7 @@ def _connect(known: weakref.ref[Connection], link: str, run: Optional[Run]) -> N
         # Before the first step there is no mesh.
         run.wait_for(lambda: of_run.features or known() is None)
         if known() is None:
-            run.close()
+            # It closes with this thread, unless somebody refers to the run itself.
             return
         surface = run.surface
         if (connected := known()) is not None:
