@@ -138,6 +138,7 @@ fn the_pictures_for_a_paper_are_drawn() {
     for (drawn, shown) in
         [("arrows", "nozzle.png"), ("cut", "nozzle-cut.png"), ("wall", "nozzle-wall.png")]
     {
-        std::fs::copy(folder.path().join(format!("{drawn}-000060.png")), gallery(shown)).expect("drawn");
+        std::fs::copy(folder.path().join(format!("{drawn}-000060.png")), gallery(shown))
+            .expect("drawn");
     }
 }

@@ -4,7 +4,8 @@
     pvpython clients/paraview/nozzle.py tombolo-7070.link
 
 The three orders are the paper's: at once, and in ten shapes; the last one is given as the displacement that two chains
-of edits add up to. With `--out` what is shown after each order is written as `shown-CYCLE.vtp`.
+of edits add up to. Each makes the shape that its chain shows, whatever the run had before; its undo brings that back.
+With `--out` what is shown after each order is written as `shown-CYCLE.vtp`.
 """
 
 import argparse

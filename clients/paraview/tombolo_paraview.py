@@ -89,7 +89,8 @@ _FEATURES = (
         "HarmonicOrder", "How smoothly the rest follows: 1 with a kink, 2 with a slope, 3 with a curvature.", 2, 1, 3
     )
 )
-_LINK = _text("Link", "The link that the run has printed, or its file tombolo-PORT.link.")
+_EXPECTED = "the link that the run has printed, or its file tombolo-PORT.link"
+_LINK = _text("Link", f"What the run is reached by: {_EXPECTED}.")
 
 
 def _names(text):
@@ -216,26 +217,43 @@ class _Algorithm(VTKPythonAlgorithmBase):
 # ---- Sources.
 
 
-class _Source(_Algorithm):
+class _Linked(_Algorithm):
+    """What has a link to a run."""
+
+    link = ""
+
+    def __init__(self):
+        super().__init__()
+        self._held = held = []
+        # VTK keeps the attributes of what ParaView has deleted, until others take their place.
+        self.AddObserver("DeleteEvent", lambda *_: held.clear())
+
+    SetLink = _setter("link")
+
+    def connected(self):
+        """The connection of the link, which lasts as long as a source or filter holds it; None for an empty link."""
+        connected = connection(self.link)
+        self._held[:] = [connected]
+        return connected
+
+
+class _Source(_Linked):
     """What shows the newest of a run, and never waits for it."""
 
     inputs = 0
-    link = ""
     _shown = None
-
-    SetLink = _setter("link")
 
     def found(self, connected):
         """What there is to show, or a text of why there can be nothing; None where it has not come yet."""
         raise NotImplementedError
 
     def convert(self, found):
-        """The same for VTK."""
+        """The data object of VTK that shows what there is."""
         raise NotImplementedError
 
     def newest(self):
         """What there is to show, or a text of why there is nothing."""
-        connected = connection(self.link)
+        connected = self.connected()
         if connected is None:
             return None
         found = self.found(connected)
@@ -480,7 +498,11 @@ class TomboloExport(_Algorithm):
     def Write(self):
         self.GetInputAlgorithm(0, 0).Update()
         data = self.GetInputDataObject(0, 0)
+        # What is wrong is told each time.
+        self._told = None
         try:
+            if not self.file:
+                raise tombolo.ConfigurationError("FileName: found an empty text, expected the name of a file")
             rows = zip(_vertices(data).tolist(), _displacement(data, "displacement").tolist())
             with open(self.file, "w", encoding="utf-8") as file:
                 file.write("# vertex dx dy dz\n")
@@ -504,22 +526,21 @@ class TomboloExport(_Algorithm):
     )
     + _count("Steps", "In how many shapes the new one is reached.", 10, 1, 1000)
     + _count("Every", "How many solver steps each shape takes.", 2, 1, 100000)
-    + _button("Forecast", "Asks what the order would come to; nothing changes.")
-    + _button("Give", "Gives the order.")
-    + _button("Undo", "Takes the last order back.")
+    + _button("Forecast", "Asks what Give would come to; nothing changes.")
+    + _button("Give", "Orders the shape that the input shows, in place of whatever shape the run has.")
+    + _button("Undo", "Takes the last order back: the run gets the shape that it had before.")
     + _button("Refresh", "Takes the newest status. The interface does so by itself.")
 )
-class TomboloOrder(_Algorithm):
+class TomboloOrder(_Linked):
     """Forecasts, gives and undoes an order. Its output is a table of what became of them."""
 
     output = "vtkTable"
-    link, array, steps, every = "", "displacement", 10, 2
+    array, steps, every = "displacement", 10, 2
 
     def __init__(self):
         super().__init__()
         self._requests, self._shown = Requests(), None
 
-    SetLink = _setter("link")
     SetArray = _setter("array")
     SetSteps = _setter("steps")
     SetEvery = _setter("every")
@@ -543,33 +564,38 @@ class TomboloOrder(_Algorithm):
             moved = vtk.points(data) - surface.points[at]
         return _as_edits(vertices, moved)
 
+    def order(self, connected):
+        """The order of the shape that the input shows.
+
+        That is measured from the reference, so the order replaces the edits that the run has.
+        """
+        return {"stack": self.edits(connected), "schedule": {"steps": self.steps, "every": {"steps": self.every}}}
+
     def _ask(self, request):
         """Asks for something, and tells what is wrong each time."""
         self.GetInputAlgorithm(0, 0).Update()
         self._told = None
-        connected = connection(self.link)
+        connected = self.connected()
         try:
-            if connected is None or connected.run is None:
-                reason = None if connected is None else connected.failure
-                raise tombolo.LinkError(reason or "no run is connected yet")
+            if connected is None:
+                raise tombolo.LinkError(f"Link: found an empty text, expected {_EXPECTED}")
+            if connected.run is None:
+                raise tombolo.LinkError(connected.failure or "no run is connected yet")
             request(connected)
         except tombolo.TomboloError as error:
             self.tell(str(error))
 
-    def _schedule(self):
-        return {"steps": self.steps, "every": {"steps": self.every}}
-
     def Forecast(self):
-        self._ask(lambda to: self._requests.forecast(to.run, self.edits(to), schedule=self._schedule()))
+        self._ask(lambda to: self._requests.forecast(to.run, self.order(to)))
 
     def Give(self):
-        self._ask(lambda to: self._requests.order(to.run, self.edits(to), schedule=self._schedule()))
+        self._ask(lambda to: self._requests.order(to.run, self.order(to)))
 
     def Undo(self):
         self._ask(lambda to: self._requests.undo(to.run))
 
     def _table(self):
-        rows, connected = self._requests.outcomes, connection(self.link)
+        rows, connected = self._requests.outcomes, self.connected()
         if connected is not None and connected.run is not None:
             rows["stack"] = f"{connected.run.edit_count} edits"
         return rows

@@ -373,6 +373,20 @@ def sampled(lower: float, upper: float, trials: int) -> Search:
     return find
 
 
+def evolved(lower: float, upper: float, trials: int) -> Search:
+    """A search for the value at which the quantity is least by CMA-ES, which takes no answer for exact either."""
+    import cma
+
+    def find(ask: Ask, _: float) -> float:
+        # It searches for two numbers at least: the second one changes nothing.
+        options = {"bounds": [0, 1], "maxiter": max(trials // 6, 1), "popsize": 6, "seed": 1, "verbose": -9}
+        search = cma.CMAEvolutionStrategy([0.5, 0.5], 0.25, options)
+        search.optimize(lambda at: ask(lower + float(at[0]) * (upper - lower)))
+        return lower + float(search.result.xfavorite[0]) * (upper - lower)
+
+    return find
+
+
 def arguments(
     description: str, case: str, tolerance: float, schedule: int, criterion: Criterion
 ) -> argparse.ArgumentParser:
@@ -397,13 +411,16 @@ def arguments(
 def bounds(parser: argparse.ArgumentParser, lower: float, upper: float, meaning: str) -> None:
     """What studies that look for the least can be told too."""
     parser.add_argument("--bounds", type=float, nargs=2, default=(lower, upper), help=meaning)
-    parser.add_argument("--trials", type=int, help="search by Optuna, where that is installed, with so many answers")
+    parser.add_argument("--trials", type=int, help="search by sampling, with so many answers")
+    parser.add_argument("--by", choices=("optuna", "cma"), default="optuna", help="the package that samples")
 
 
 def search(given: argparse.Namespace) -> Search:
     """The search for the least that the command line asks for."""
     lower, upper = given.bounds
-    return sampled(lower, upper, given.trials) if given.trials else least(lower, upper, given.tolerance)
+    if not given.trials:
+        return least(lower, upper, given.tolerance)
+    return (evolved if given.by == "cma" else sampled)(lower, upper, given.trials)
 
 
 def flows(given: argparse.Namespace, quantity: Quantity = DROP) -> Flows:

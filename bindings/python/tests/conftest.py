@@ -226,10 +226,10 @@ def run(solver):
 @pytest.fixture
 def connections(monkeypatch):
     """The connections in the background: none is known before a test, and none is left behind it."""
-    known = {}
+    known = type(background._CONNECTIONS)()
     monkeypatch.setattr(background, "_CONNECTIONS", known)
     yield known
-    for connection in known.values():
+    for connection in list(known.values()):
         if connection.run is not None:
             connection.run.close()
 

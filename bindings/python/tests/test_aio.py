@@ -1,6 +1,7 @@
 """A run from outside in `async` programs."""
 
 import asyncio
+import copy
 import os
 import signal
 import threading
@@ -9,6 +10,7 @@ import time
 import pytest
 import tombolo
 from conftest import SQUEEZE, Relay
+from tombolo.aio import AsyncOrder
 
 
 def test_a_run_in_async(solver, run):
@@ -266,3 +268,55 @@ def test_a_run_is_connected_in_async(solver):
             await tombolo.aio.connect("http://127.0.0.1:1/?token=abc")
 
     asyncio.run(work())
+
+
+def test_orders_of_async_programs_are_cancelled_and_replaced(begin):
+    running = begin(step=900.0)
+    with tombolo.connect(running.link) as run:
+
+        async def work():
+            aio = run.aio
+            await aio.wait_for(lambda: run.features, 30)
+            first = await aio.order(SQUEEZE)
+            assert copy.copy(first).order is first.order and copy.deepcopy([first.id]) == [first.id]
+            assert not hasattr(first, "__len__") and not hasattr(AsyncOrder.__new__(AsyncOrder), "order")
+            second = await aio.order(SQUEEZE, replaces=first)
+            third = run.order(SQUEEZE, replaces=second)
+            fourth = await aio.order(SQUEEZE, replaces=third)
+            cancelled = asyncio.create_task(aio.cancel(fourth, timeout=60))
+            # It may be under way by then.
+            running.step = 0.002
+            await asyncio.gather(cancelled, return_exceptions=True)
+            for order in (first, second):
+                with pytest.raises(tombolo.RejectedError, match="replaced by order"):
+                    await order.wait(60)
+            for ask in (lambda: aio.cancel(3), lambda: aio.order(SQUEEZE, replaces=[first])):
+                with pytest.raises(tombolo.ConfigurationError, match="expected an order or its id"):
+                    await ask()
+            with pytest.raises(tombolo.RejectedError, match=fourth.id):
+                run.cancel(fourth, timeout=60)
+
+        asyncio.run(work())
+
+
+def test_waits_in_vain_and_timeouts_that_are_none(run):
+    async def work():
+        aio = run.aio
+        for ask, text in (
+            (lambda: aio.wait_for_cycle(10**9, timeout=0.1), "no step from cycle 1000000000 on was told within 0.1 s"),
+            (lambda: aio.wait(timeout=0), "the run did not end within 0 seconds"),
+        ):
+            with pytest.raises(tombolo.WaitError, match=text):
+                await ask()
+        for ask in (
+            lambda: aio.set("heating", 5, timeout=-1),
+            lambda: aio.forecast(SQUEEZE, timeout="soon"),
+            lambda: aio.wait(float("nan")),
+            lambda: aio.drive(float("nan")),
+            lambda: aio.link_for(timeout=-1),
+        ):
+            with pytest.raises(tombolo.ConfigurationError, match=r"timeout: found .*expected"):
+                await ask()
+
+    asyncio.run(work())
+    assert run.parameters["heating"].value == 1

@@ -1,6 +1,8 @@
 """Runs that are connected and steered in the background, as a program with an interface does it."""
 
+import threading
 import time
+import weakref
 
 import pytest
 import tombolo
@@ -96,3 +98,57 @@ def test_orders_are_forecast_given_and_taken_back(solver):
     requests.undo(watching)
     wait(lambda: requests.outcomes["undo"].startswith("refused: this client only watches"))
     watching.close()
+
+
+class Slow:
+    """A run whose answers come when they are let through, or are an error that nobody expects."""
+
+    def __init__(self):
+        self.let_through = {}
+
+    def forecast(self, edits):
+        if edits is None:
+            raise TypeError("no such edits")
+        assert self.let_through.setdefault(edits, threading.Event()).wait(30)
+        return tombolo.Forecast({"outcome": edits, "min_scaled_jacobian": 0.5})
+
+
+def test_of_the_answers_the_one_to_the_last_question_is_kept():
+    run, requests = Slow(), Requests()
+    for edits in ("first", "second"):
+        requests.forecast(run, edits)
+        wait(lambda edits=edits: edits in run.let_through)
+    for edits in ("second", "first"):
+        run.let_through[edits].set()
+        wait(lambda: requests.outcomes["forecast"] != "asked")
+    wait(lambda: all(not thread.name.startswith("tombolo-forecast") for thread in threading.enumerate()))
+    assert requests.outcomes["forecast"] == "second, least scaled Jacobian 0.5"
+    requests.forecast(run, None)
+    assert wait(lambda: requests.outcomes["forecast"].partition("asked")[0]) == "failed: TypeError: no such edits"
+
+
+def test_an_error_that_nobody_expects_is_told():
+    known = connection("http://a\ud800:9/?token=a")
+    assert wait(lambda: known.failure).startswith("UnicodeEncodeError: ")
+
+
+def test_a_connection_lasts_as_long_as_somebody_refers_to_it(solver, connections):
+    known, again = [connection(solver.link)], connection(solver.link)
+    wait(lambda: known[0].surface)
+    with tombolo.connect(solver.link, watch=True) as other:
+        other.wait_for(lambda: other.status.viewers == 2, 30)
+        known.clear()
+        assert len(connections) == 1
+        del again
+        assert not connections
+        other.wait_for(lambda: other.status.viewers == 1, 30)
+
+
+def test_a_connection_that_waits_for_the_first_step_ends_too(connections):
+    with tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}}) as adaptor:
+        known = [connection(adaptor.link)]
+        thread, run = known[0]._thread, weakref.ref(wait(lambda: known[0].run))
+        assert known[0].surface is None and known[0].failure is None and thread.is_alive()
+        known.clear()
+        thread.join(20)
+        assert not thread.is_alive() and run() is None and not connections

@@ -2,6 +2,7 @@
 
 import ast
 import asyncio
+import io
 import re
 import sys
 import textwrap
@@ -24,6 +25,8 @@ def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
     pytest.importorskip("pyvista")
     pytest.importorskip("pandas")
     monkeypatch.chdir(tmp_path)
+    # Somebody presses Enter.
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n"))
     configuration = {
         "version": 1,
         "stream": {"listen": "127.0.0.1:0"},

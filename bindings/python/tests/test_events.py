@@ -5,6 +5,7 @@ import threading
 
 import pytest
 import tombolo
+from conftest import wait
 from tombolo.state import State
 
 
@@ -102,3 +103,33 @@ def test_nobody_waits_for_a_reader_that_has_failed(solver, monkeypatch):
         monkeypatch.setattr(run._state, "take", lambda kind, data: 1 / 0)
         with pytest.raises(tombolo.FailedError, match="ZeroDivisionError"):
             run.wait_for(lambda: False, 30)
+
+
+def test_a_function_that_is_added_after_the_end_is_called_once(solver, run):
+    first, second = [], []
+    run.on("ended", first.append)
+    run.stop(timeout=30)
+    run.wait(30)
+    wait(lambda: first)
+    for _ in range(2):
+        # The thread of the first has ended, or is about to.
+        run.on("ended", second.append)
+        wait(lambda: second)
+        assert [event.kind for event in second] == ["ended"] and len(first) == 1
+        second.clear()
+
+
+def test_after_the_end_every_question_says_so(solver, run):
+    run.wait_for(lambda: run.features, 30)
+    run.stop(timeout=30)
+    # It is told that it ends, and the connection ends a moment later.
+    wait(lambda: not run.connected)
+    for ask in (
+        lambda: run.surface,
+        lambda: run.stack,
+        lambda: run.pipelines,
+        run.link_for,
+        lambda: run.hand_over("c1"),
+    ):
+        with pytest.raises(tombolo.EndedError, match="the run has ended: stopped"):
+            ask()

@@ -180,6 +180,22 @@ def test_an_angle_is_found_on_a_running_flow_and_with_restarts(small_case):
     assert found.running.mean < 0.9 * found.restarted.mean
 
 
+@pytest.mark.parametrize("package", ["optuna", "cma"])
+def test_a_search_by_sampling_finds_the_least_of_noisy_answers(package):
+    pytest.importorskip(package)
+    parser = study.arguments("a study", "case.json", 1e-3, 5, study.Criterion(10, 1e-3))
+    study.bounds(parser, 1.0, 3.0, "the bounds")
+    search = study.search(parser.parse_args(["--flow", "flow", "--trials", "60", "--by", package]))
+    noise, asked = np.random.default_rng(1), []
+
+    def ask(value):
+        asked.append(value)
+        return (value - 1.6) ** 2 + noise.normal(0, 0.01)
+
+    assert search(ask, 0.0) == pytest.approx(1.6, abs=0.2)
+    assert len(asked) == 60 and min(asked) >= 1 and max(asked) <= 3
+
+
 def test_a_study_that_is_terminated_ends_its_flow(small_nozzle, tmp_path):
     pytest.importorskip("scipy")
     if not Path("/proc/self/task").exists():

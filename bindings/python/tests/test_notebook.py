@@ -1,7 +1,9 @@
 """A run in a notebook: its cells are run again, and what they return is shown."""
 
 import gc
+import os
 import re
+import subprocess
 import sys
 import types
 from html.parser import HTMLParser
@@ -156,3 +158,37 @@ def test_a_plot_of_what_is_not_measured_does_not_live(run, monkeypatch):
     for names, near in ((("helth", "quality.min"), "health"), (("health", "qality.min"), "quality.min")):
         with pytest.raises(KeyError, match=rf"did you mean '{near}'"):
             Plot(run, *names).live(timeout=30)
+
+
+SHOWN = """
+import sys
+import tombolo
+from IPython.core.interactiveshell import InteractiveShell
+from IPython.display import display
+from IPython.utils.capture import capture_output
+
+shell = InteractiveShell.instance()
+shell.display_formatter.active_types = shell.display_formatter.format_types
+with tombolo.connect(sys.argv[1]) as run:
+    table = run.monitors["health"]
+    run.wait_for(lambda: table.rows > 5, 30)
+    with capture_output() as captured:
+        display(run)
+        run.plot("health", "quality.min").live(timeout=1.2)
+for shown in captured.outputs:
+    data, of_display = shown.data, (shown.transient or {}).get("display_id")
+    print(*sorted(data), of_display is not None, shown.update)
+    assert "<table>" in data.get("text/html", "<table>") and "<polyline" in data.get("image/svg+xml", "<polyline")
+"""
+
+
+def test_a_run_and_a_plot_that_lives_are_displayed_by_ipython(solver, tmp_path):
+    pytest.importorskip("IPython")
+    environment = os.environ | {"IPYTHONDIR": str(tmp_path)}
+    command = [sys.executable, "-c", SHOWN, solver.link]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    of_run, of_plot, *updates = done.stdout.splitlines()
+    assert of_run == "text/html text/plain False False"
+    assert of_plot == "image/svg+xml text/plain True False"
+    assert updates and set(updates) == {"image/svg+xml text/plain True True"}

@@ -1,8 +1,10 @@
 """The plug-in of ParaView: in plain VTK, and in ParaView's own Python where that is installed."""
 
 import ast
+import gc
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -263,6 +265,76 @@ def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
         order.edits(SimpleNamespace(surface=other))
 
 
+def test_an_order_makes_the_shape_that_its_chain_shows_whatever_was_before_in_plain_vtk(plugin, solver):
+    from tombolo import vtk
+
+    surface = plugin.make("TomboloSurface", Link=solver.link)
+    newest(surface)
+    run = tombolo.background.connection(solver.link).run
+    ends = {"Features": "top", "Fixed": "bottom"}
+    before = [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, 0.1]}}]
+    run.order(before).wait(60)
+    edits = plugin.make("TomboloTranslate", surface, By=[0, 0, -0.2], **ends)
+    order = plugin.make("TomboloOrder", edits, Link=solver.link, Steps=2, Every=1)
+
+    def ordered():
+        count = len(run.orders)
+        order.Give()
+        wait(lambda: len(run.orders) > count)
+        run.orders[-1].wait(60)
+        return [edit["translate"]["by"] for edit in run.stack]
+
+    assert ordered() == ordered() == [[0, 0, -0.2]]
+    moved = vtk.array(shown(edits).GetPointData(), "displacement")
+    reference = tombolo.background.connection(solver.link).surface
+    expected = reference.points + moved
+    wait(lambda: np.allclose(solver.points[reference.vertices], expected, rtol=0, atol=1e-12))
+    # A displacement that no list of edits stands for is given in the same way.
+    half = plugin.make("TomboloCombine", edits, edits, Weights=[0.25, 0.25])
+    order.SetInputConnection(half.GetOutputPort())
+    order.Give()
+    wait(lambda: len(run.orders) == 4 and run.orders[-1].wait(60))
+    wait(lambda: solver.points[:, 2].max() == pytest.approx(0.9))
+    for expected in ([[0, 0, -0.2]], [[0, 0, -0.2]], [[0, 0, 0.1]]):
+        count = len(run.orders)
+        order.Undo()
+        wait(lambda count=count: len(run.orders) > count)
+        run.orders[-1].wait(60)
+        assert [edit["translate"]["by"] for edit in run.stack] == expected
+    wait(lambda: solver.points[:, 2].max() == pytest.approx(1.1))
+    assert plugin.errors == []
+
+
+def test_a_connection_ends_with_the_last_source_in_plain_vtk(plugin, solver, connections):
+    source = plugin.make("TomboloSurface", Link=solver.link)
+    newest(source)
+    order = plugin.make("TomboloOrder", source, Link=solver.link)
+    order.Update()
+    with tombolo.connect(solver.link, watch=True) as other:
+        other.wait_for(lambda: other.status.viewers == 2, 30)
+        del source
+        gc.collect()
+        assert len(connections) == 1
+        del order
+        gc.collect()
+        assert not connections
+        other.wait_for(lambda: other.status.viewers == 1, 30)
+
+
+def test_what_is_missing_is_told_at_each_press_in_plain_vtk(plugin, solver):
+    source = plugin.make("TomboloSurface", Link=solver.link)
+    newest(source)
+    written, order = plugin.make("TomboloExport", source), plugin.make("TomboloOrder", source)
+    for button, text in (
+        (written.Write, "FileName: found an empty text, expected the name of a file"),
+        (order.Give, "Link: found an empty text, expected the link"),
+        (order.Forecast, "Link: found an empty text, expected the link"),
+    ):
+        for _ in range(2):
+            button()
+            assert text in plugin.errors.pop() and plugin.errors == []
+
+
 def test_why_there_is_no_run_is_told_once_in_plain_vtk(plugin, tmp_path):
     (tmp_path / "run.link").write_text("nothing")
     source = plugin.make("TomboloRun", Link=str(tmp_path / "run.link"))
@@ -339,6 +411,27 @@ def test_each_filter_moves_the_surface_as_the_kernel_does(solver, tmp_path):
     assert np.array_equal(written, expected["two"])
     assert len(set(pyvista.read(tmp_path / "angle.vtp").cell_data["features"])) == 6
     assert pyvista.read(tmp_path / "curve.vtp").point_data["radius"].min() > 0
+
+
+DELETED = """
+import sys
+from nozzle import *
+from tombolo import background
+sources = [TomboloSurface(Link=sys.argv[1]), TomboloRun(Link=sys.argv[1])]
+for source in sources:
+    wait(source, lambda data: data.GetNumberOfPoints() > 0)
+del source
+while sources:
+    print("connections:", len(background._CONNECTIONS))
+    simple.Delete(sources.pop())
+print("connections:", len(background._CONNECTIONS))
+"""
+
+
+def test_a_connection_ends_when_paraview_deletes_its_last_source(solver, tmp_path):
+    (tmp_path / "deleted.py").write_text(DELETED)
+    said = pvpython(tmp_path / "deleted.py", solver.link)
+    assert re.findall(r"connections: (\d)", said) == ["1", "1", "0"], said
 
 
 def triangles(rows):

@@ -415,3 +415,34 @@ def test_a_run_that_does_not_answer_is_waited_for_as_long_as_the_caller_says(sol
         with pytest.raises(tombolo.WaitError, match=r"no answer within 0\.5 seconds"):
             tombolo.connect(relay.link, timeout=0.5)
     relay.server.close()
+
+
+def test_a_wait_in_vain_says_for_what(begin):
+    running = begin(step=900.0)
+    with tombolo.connect(running.link) as run:
+        run.wait_for(lambda: run.features, 30)
+        order = run.order(SQUEEZE)
+        for ask, text in (
+            (lambda: order.wait(0.5), f"the order {order.id} was not applied within 0.5 seconds"),
+            (lambda: order.wait(0.5, until="applying"), f"the order {order.id} was not applying within 0.5 seconds"),
+            (lambda: run.set("heating", 2, timeout=0.5), "(set) did not take effect within 0.5 seconds"),
+            (lambda: run.wait(0.1), "the run did not end within 0.1 seconds"),
+            (lambda: run.wait_for_cycle(9, 0.1), "no step from cycle 9 on was told within 0.1 seconds"),
+            (lambda: run.wait_for_view("midplane", after=9, timeout=0.1), "no newer frame of the view 'midplane' came"),
+            (lambda: run.wait_for(lambda: False, 0.1), "what was looked for did not come within 0.1 seconds"),
+            (lambda: next(run.events("lost", "end", timeout=0.1)), "no event 'lost' or 'end' came within 0.1 seconds"),
+        ):
+            with pytest.raises(tombolo.WaitError) as error:
+                ask()
+            assert text in str(error.value)
+        running.step = 0.002
+
+
+def test_a_wait_whose_function_closes_the_run_ends_at_once(solver):
+    run = tombolo.connect(solver.link)
+    begun = time.monotonic()
+    with pytest.raises(tombolo.CallError, match="the run was closed"):
+        run.wait_for(run.close, 20)
+    assert time.monotonic() - begun < 3 and not run.connected
+    run._reader._thread.join(10)
+    assert run._reader._client is None

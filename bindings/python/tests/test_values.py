@@ -1,6 +1,11 @@
 """What cannot be meant is told where it was given: what was found, and what is expected."""
 
 import asyncio
+import copy
+import os
+import subprocess
+import sys
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -187,3 +192,95 @@ def test_an_error_of_a_property_is_told():
 
     with tombolo.Adaptor() as adaptor, pytest.raises(tombolo.MeshError, match="not on this device"):
         adaptor.execute(0, 0.0, 0.1, {"solid": Odd()})
+
+
+def test_timeouts_are_seconds_and_are_looked_at_before_anything_is_sent(run, solver):
+    for timeout in (float("nan"), -1, "1", [1]):
+        for ask in (
+            lambda timeout=timeout: run.set("heating", 5, timeout=timeout),
+            lambda timeout=timeout: run.pause(timeout=timeout),
+            lambda timeout=timeout: run.pause(wait=False, timeout=timeout),
+            lambda timeout=timeout: run.forecast(SQUEEZE, timeout=timeout),
+            lambda timeout=timeout: run.drive(timeout),
+            lambda timeout=timeout: run.hand_over("c1", timeout),
+            lambda timeout=timeout: run.link_for("watch", timeout),
+            lambda timeout=timeout: run.wait(timeout),
+            lambda timeout=timeout: run.wait_for(lambda: False, timeout),
+            lambda timeout=timeout: run.wait_for_cycle(10**9, timeout),
+            lambda timeout=timeout: run.wait_for_view("midplane", after=10**9, timeout=timeout),
+            lambda timeout=timeout: next(run.events("lost", timeout=timeout)),
+            lambda timeout=timeout: tombolo.connect(solver.link, timeout=timeout),
+        ):
+            with pytest.raises(tombolo.ConfigurationError) as error:
+                ask()
+            assert f"timeout: found {timeout!r}, expected" in str(error.value)
+    assert not run.drives
+    assert run.set("heating", np.float32(2), timeout=np.float32(30)).done and run.link_for(timeout=float("inf"))
+    assert run.parameters["heating"].value == 2 and not run.status.paused
+
+
+def test_cycles_are_any_whole_numbers(run):
+    table = run.monitors["health"]
+    run.wait_for(lambda: table.rows, 30)
+    status = run.wait_for_cycle(np.int64(2), 30)
+    assert run.wait_for_cycle(table["cycle"][-1] + 2, 30).cycle > status.cycle - 1
+    assert run.wait_for_view("midplane", after=np.int32(2), timeout=30).cycle > 2
+    for ask in (lambda: run.wait_for_cycle("3", 1), lambda: run.wait_for_view("midplane", after="3", timeout=1)):
+        with pytest.raises(tombolo.ConfigurationError, match="found '3', expected a number"):
+            ask()
+    steering = tombolo.Adaptor().execute(np.int64(0), 0.0, 0.1, tombolo.Mesh(POINTS, {"tetra": TETS}))
+    assert steering.motion is None
+
+
+def test_what_has_arrays_is_equal_to_itself_alone():
+    shaper = tombolo.Shaper(POINTS, {"tetra": TETS})
+    surface, table = shaper.surface, tombolo.MonitorTable("health")
+    table._append({"cycle": 0, "time": 0.0, "values": {"drag": 1.0}})
+    shape = tombolo.Shape(POINTS, 1.0, 0.5, {"min": 0.5}, {})
+    skeleton = tombolo.Skeleton(POINTS, np.ones(8), [], np.zeros(8, np.uint32))
+    view = tombolo.View("skin", 0, 0.0, POINTS, TETS[:, :3], TETS[:, :2], None, {}, {})
+    for one in (surface, table, shape, skeleton, view):
+        same = one
+        assert (one == same, one != same, one in [same], len({one, same})) == (True, False, True, 1)
+        other = copy.copy(one) if one is table else one._replace()
+        assert (one == other, one != other, one in [other], len({one, other})) == (False, True, False, 2)
+
+
+@pytest.mark.parametrize("empty", [np.empty((0, 3), int), [], {"triangle": np.empty((0, 3), int)}, {}])
+def test_a_feature_without_faces_is_told_by_its_name(empty):
+    faces = {"top": [[0, 1, 2]], "lid": empty}
+    for given in ((POINTS, {"tetra": TETS}, faces), (tombolo.Mesh(POINTS, {"tetra": TETS}, faces=faces),)):
+        with pytest.raises(tombolo.MeshError, match="the feature 'lid' has no faces"):
+            tombolo.Shaper(*given)
+
+
+CALLER = """
+import numpy as np
+import tombolo
+
+conditions = {"inlet": "inflow"}
+cycle = np.int64(3)
+adaptor = tombolo.Adaptor(conditions=conditions)
+adaptor.execute(cycle, 0.0, 0.1, tombolo.Mesh(np.zeros((3, 3))))
+adaptor.looks_at(cycle, 0.0, 0.1)
+
+
+async def steer(run: tombolo.Run) -> None:
+    run.wait_for_cycle(cycle)
+    run.wait_for_view("skin", after=cycle)
+    run.wait_for_cycle(run.monitors["heat"]["cycle"][-1])
+    run.undo(np.int64(1))
+    order = await run.aio.order([], deadline=np.int64(3))
+    run.order([], replaces=order)
+    await run.aio.cancel(order)
+    await run.aio.wait_for_cycle(cycle)
+"""
+
+
+def test_what_callers_give_has_the_types_that_it_is_said_to_have(tmp_path):
+    pytest.importorskip("mypy")
+    (tmp_path / "caller.py").write_text(CALLER)
+    environment = os.environ | {"MYPYPATH": str(Path(tombolo.__file__).parents[1])}
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", tmp_path / "cache", "caller.py"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import time
 
 import numpy as np
 import pytest
@@ -91,3 +92,43 @@ def test_tables_are_copied_with_the_rows_that_there_are():
         assert other.pipeline == "health" and np.array_equal(other["drag"], np.arange(100))
         other._append({"cycle": 100, "time": 10, "values": {"drag": 100, "lift": 1}})
         assert other.last == {"cycle": 100, "time": 10, "drag": 100, "lift": 1} and other.rows == 101
+
+
+def test_without_frames_no_view_is_waited_for(solver):
+    with tombolo.connect(solver.link, views=False) as run:
+        begun = time.monotonic()
+        with pytest.raises(KeyError, match="connected with views=False"):
+            run.views["midplane"]
+        with pytest.raises(tombolo.CallError, match="connected with views=False"):
+            run.wait_for_view("midplane", timeout=30)
+        assert time.monotonic() - begun < 3 and not run.views and run.view_names == ["midplane"]
+
+
+def test_a_view_that_was_removed_is_there_no_more(run):
+    skin = {"name": "skin", "stages": [{"surface": {}}, {"stream": {}}]}
+    for _ in range(2):
+        run.change_pipelines({"set": [skin]}, timeout=30)
+        assert len(run.wait_for_view("skin", timeout=30).triangles) and "skin" in run.views
+        run.change_pipelines({"remove": ["skin"]}, timeout=30)
+        run.wait_for(lambda: "skin" not in run.view_names, 30)
+        assert list(run.views) == ["midplane"] and len(run.views) == 1
+        with pytest.raises(KeyError, match="no view 'skin'"):
+            run.views["skin"]
+
+
+def test_tables_of_cycles_that_are_counted_anew_are_joined_by_row():
+    pytest.importorskip("pandas")
+    monitors = tombolo.Monitors()
+    for step in range(6):
+        for pipeline, every in (("health", 1), ("drag", 2)):
+            if step % every == 0:
+                told = {"cycle": step % 3, "time": 0.1 * step, "values": {"value": 10 * every + step}}
+                monitors._table(pipeline)._append(told)
+    frame = monitors.to_pandas()
+    assert frame.index.tolist() == [0, 1, 2, 0, 1, 2] and frame.index.name == "cycle"
+    assert frame["health.value"].tolist() == [10, 11, 12, 13, 14, 15]
+    assert frame["drag.value"].fillna(-1).tolist() == [20, -1, 22, -1, 24, -1]
+    # One step that is shown twice.
+    for value in (1, 2):
+        monitors._table("health")._append({"cycle": 9, "time": 9.0, "values": {"value": value}})
+    assert monitors.to_pandas().loc[9, "health.value"].tolist() == [1, 2]

@@ -7,7 +7,7 @@ from conftest import box, ends, features_of, features_of_program, program
 
 pytest.importorskip("vtkmodules")
 from tombolo import vtk
-from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData, vtkUnstructuredGrid
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkMultiBlockDataSet, vtkPolyData, vtkUnstructuredGrid
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader, vtkXMLUnstructuredGridWriter
 
 POINTS, TETS = box(3)
@@ -205,3 +205,31 @@ def test_features_of_pixels_and_strips_are_kept():
     triangles = [(0, 4, 1), (1, 4, 5), (1, 5, 2), (2, 5, 6)]
     assert strips == features(*((5, it, 3) for it in triangles), (5, (4, 8, 5), 1), (5, (5, 8, 9), 1))
     assert [name for name, *_ in strips] == ["feature-1", "feature-3"]
+
+
+def test_polyhedra_and_quadratic_cells_are_refused_by_name():
+    pyvista = pytest.importorskip("pyvista")
+    corners = [(x, y, z) for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)]
+    sides = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces = [len(sides), *(number for side in sides for number in (len(side), *side))]
+    polyhedron = pyvista.UnstructuredGrid([len(faces), *faces], [pyvista.CellType.POLYHEDRON], np.array(corners))
+    quadratic = pyvista.UnstructuredGrid({24: np.arange(10)[None]}, np.eye(10, 3))
+    for given, text in (
+        (polyhedron, "found 1 polyhedra, expected cells of other types"),
+        (quadratic, r"found 1 quadratic cells \(VTK's type 24\), expected linear cells: .* mesh\.linear_copy\(\)"),
+        (pyvista.MultiBlock({"wing": pyvista.Cube(), "tail": pyvista.Cube()}), r"'wing', 'tail' .* mesh\.combine\(\)"),
+        (vtkMultiBlockDataSet(), "a vtkMultiBlockDataSet of no block"),
+    ):
+        with pytest.raises(tombolo.MeshError, match=text):
+            tombolo.Shaper(given)
+
+
+def test_a_mesh_of_pyvista_is_not_asked_for_all_its_cells():
+    pyvista = pytest.importorskip("pyvista")
+
+    class Grid(pyvista.UnstructuredGrid):
+        @property
+        def cells_dict(self):
+            raise AssertionError("it would be made of all cells")
+
+    assert len(tombolo.Shaper(Grid({10: TETS}, POINTS)).scaled_jacobians()) == len(TETS)

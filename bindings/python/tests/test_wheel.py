@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -37,11 +38,16 @@ def test_a_wheel_needs_python_alone(wheel, tmp_path):
         (packages / folder.name).symlink_to(folder)
     lines = re.search(r"^```python\n(.*?)^```", PAGE.read_text(), re.S | re.M)[1]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
-    done = subprocess.run(
-        [python, "-c", lines], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("http://127.0.0.1:")
+    command = [python, "-c", lines]
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdin=-1, stdout=-1, stderr=-1, text=True) as process:
+        try:
+            # The link leads somewhere until Enter is pressed.
+            if line := process.stdout.readline():
+                assert urlopen(line.split()[-1], timeout=30).status == 200
+            _, said = process.communicate("\n", timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == 0 and line, said
     (picture,) = tmp_path.glob("height-*.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
     told = subprocess.run([tmp_path / "venv/bin/tombolo", "--version"], check=True, capture_output=True, text=True)

@@ -1,6 +1,6 @@
 """What is written in Rust: the classes of the package rest on it, and it may change from one version to the next."""
 
-from typing import Any, Optional, final
+from typing import Any, Optional, SupportsIndex, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,9 @@ class Run:
         mistake: Optional[str],
     ) -> Run: ...
     def execute(
-        self, cycle: int, time: float, time_step: float, channels: object
+        self, cycle: SupportsIndex, time: float, time_step: float, channels: object
     ) -> Optional[tuple[Optional[Motion], bool, Optional[dict[str, float]]]]: ...
-    def looks_at(self, cycle: int, time: float, time_step: float) -> bool: ...
+    def looks_at(self, cycle: SupportsIndex, time: float, time_step: float) -> bool: ...
     @property
     def link(self) -> Optional[str]: ...
     @property

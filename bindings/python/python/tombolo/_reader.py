@@ -27,9 +27,13 @@ _EVENTS = 4096
 _READERS: weakref.WeakSet[Reader] = weakref.WeakSet()
 
 
-def late(timeout: Optional[float]) -> WaitError:
-    """Say that what was waited for did not come in time."""
-    return WaitError(f"it did not come within {timeout} seconds")
+#: What is said of a wait in vain for what a caller's own function looks for.
+NOT_FOUND = "what was looked for did not come"
+
+
+def late(in_vain: str, timeout: Optional[float]) -> WaitError:
+    """Say what did not come in time."""
+    return WaitError(f"{in_vain} within {timeout} seconds")
 
 
 class Reader:
@@ -62,6 +66,8 @@ class Reader:
         self._process = os.getpid()
         self._listeners: list[weakref.ref[deque[Event]]] = []
         self._tells: list[Callable[[], None]] = []
+        # The thread that looks whether what it waits for is there, and holds `changed` meanwhile.
+        self._looks: Optional[int] = None
         self._thread = threading.Thread(target=self._read, args=(client,), name="tombolo-run", daemon=True)
         _READERS.add(self)
         self._thread.start()
@@ -144,6 +150,9 @@ class Reader:
         with self.changed:
             self.closed = True
             self._wake()
+            if self._looks == threading.get_ident():
+                # What this thread waits for has closed it: the one that reads lets go once `changed` is free.
+                return
         if threading.current_thread() is not self._thread:
             self._thread.join(5.0)
         self._let_go()
@@ -165,8 +174,8 @@ class Reader:
 
     # ---- Waiting.
 
-    def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
-        """As `Run.wait_for`."""
+    def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None, in_vain: str = NOT_FOUND) -> Found:
+        """As `Run.wait_for`; `in_vain` is what an error says that did not come."""
         until = moment_after(timeout)
         with self.changed:
             while True:
@@ -175,7 +184,7 @@ class Reader:
                     return answer
                 left = until - clock.monotonic()
                 if left <= 0:
-                    raise late(timeout)
+                    raise late(in_vain, timeout)
                 # Short enough for Ctrl-C on every system.
                 self.changed.wait(min(left, 1.0))
 
@@ -183,7 +192,11 @@ class Reader:
         """What `found` returns now; an error where it is nothing true and nothing comes any more."""
         with self.changed:
             self.check()
-            answer = found()
+            before, self._looks = self._looks, threading.get_ident()
+            try:
+                answer = found()
+            finally:
+                self._looks = before
             if not answer and self.failure is not None:
                 raise self._over(self.failure)
             return answer

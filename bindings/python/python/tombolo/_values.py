@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 
 from .errors import ConfigurationError
@@ -29,3 +30,11 @@ def number(value: object, name: str) -> float:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
         raise ConfigurationError(f"{name}: found {value!r}, expected a number") from None
+
+
+def seconds(timeout: object) -> float:
+    """How long a wait may take; infinitely long for None."""
+    given = math.inf if timeout is None else number(timeout, "timeout")
+    if math.isnan(given) or given < 0:
+        raise ConfigurationError(f"timeout: found {timeout!r}, expected seconds from 0 on, or None")
+    return given

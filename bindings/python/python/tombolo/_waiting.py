@@ -7,10 +7,12 @@ import time
 from collections.abc import Callable, Generator
 from typing import Any, Optional, TypeVar
 
+from ._values import seconds
+
 Result = TypeVar("Result")
 
-#: What is waited for, and how many seconds at most.
-Wanted = tuple[Callable[[], object], Optional[float]]
+#: What is waited for, how many seconds at most, and what is said of one that was in vain, such as "no status came".
+Wanted = tuple[Callable[[], object], Optional[float], str]
 #: A wait in parts, carried out by a thread (`Reader.carry_out`) or by a loop (`aio`): it yields what it wants, is given
 #: that or why it does not come, and returns what comes of it.
 Parts = Generator[Wanted, Any, Result]
@@ -18,7 +20,7 @@ Parts = Generator[Wanted, Any, Result]
 
 def moment_after(timeout: Optional[float]) -> float:
     """The moment so many seconds from now, on the clock `time.monotonic`; one that never comes for None."""
-    return float("inf") if timeout is None else time.monotonic() + timeout
+    return time.monotonic() + seconds(timeout)
 
 
 def in_thread(

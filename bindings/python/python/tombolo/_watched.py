@@ -6,20 +6,25 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import Any, Optional, TypeVar
+from typing import Any, Optional, SupportsIndex, TypeVar, Union
 
 from . import _json, _native
 from ._names import unknown
 from ._reader import Reader
+from ._values import number, seconds
 from ._waiting import Parts, in_thread
-from .errors import EndedError, WaitError
+from .errors import CallError, EndedError, LinkError, WaitError
 from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
 from .state import Parameter, State, Status
-from .views import Surface, View, Views
+from .views import NOT_WANTED, Surface, View, Views
 
 Found = TypeVar("Found")
+#: A step, also as a table of monitors has it.
+Cycle = Union[SupportsIndex, float]
 
+#: How long what a run tells first may take to come, in seconds.
+_FIRST = 20.0
 #: How long a view that nobody knows may take to be announced, in seconds.
 _ANNOUNCED = 2.0
 
@@ -30,6 +35,7 @@ class Watched:
     def __init__(self, link: str, *, watch: bool, views: bool, attempts: int, timeout: Optional[float]) -> None:
         self.link = link
         self._watch = watch
+        self._has_views = views
         self._state = State()
         client = in_thread(lambda: _native.Client(link, views, watch, attempts, timeout))
         self._reader = Reader(client, self._state)
@@ -37,7 +43,7 @@ class Watched:
         # The thread that reads holds the reader: without this a run that nobody has any more would keep the wheel.
         weakref.finalize(self, self._reader.abandon).atexit = False
         try:
-            self.wait_for(lambda: bool(self._state.hello), 20.0)
+            self._reader.wait_for(lambda: bool(self._state.hello), _FIRST, "nothing was told of the run")
         except BaseException:
             self.close()
             raise
@@ -46,10 +52,18 @@ class Watched:
 
     @property
     def status(self) -> Status:
-        """How far the solver is, as it was last told; waits for the first status."""
-        if self._state.status is None:
-            self.wait_for(lambda: self._state.status is not None, 20.0)
+        """How far the solver is, as it was last told. Before the first status it waits for it, 20 seconds at most.
+
+        Raises
+        ------
+        WaitError
+            The solver has not told any step in that time.
+        EndedError, LinkError
+            The run has ended before its first step, or the connection was lost for good.
+        """
         status = self._state.status
+        if status is None:
+            status = self._reader.wait_for(lambda: self._state.status, _FIRST, "no status of the solver came")
         assert status is not None
         return status
 
@@ -60,8 +74,8 @@ class Watched:
 
     @property
     def views(self) -> Mapping[str, View]:
-        """The newest frame of each live view that has come."""
-        return Views(self._state.views, lambda: self.view_names)
+        """The newest frame of each live view that has come; none of a view that was removed."""
+        return Views(self._state.views, lambda: self.view_names, self._has_views)
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -95,11 +109,24 @@ class Watched:
 
         Raises
         ------
+        EndedError
+            The run has ended.
         WaitError
             It does not answer in time: see `connect`.
         """
-        edits: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.stack))
+        edits: list[dict[str, Any]] = _json.loads(self._ask(lambda client: client.stack()))
         return edits
+
+    def _ask(self, question: Callable[[_native.Client], Found]) -> Found:
+        """The answer to a question that is asked apart from all that the run tells."""
+        self._reader.check_goes_on()
+        client = self._reader.client
+        try:
+            return in_thread(lambda: question(client))
+        except LinkError:
+            # It may have ended meanwhile.
+            self._reader.check_goes_on()
+            raise
 
     @property
     def edit_count(self) -> int:
@@ -134,10 +161,12 @@ class Watched:
         ------
         LinkError
             Where there is no mesh whose shape could be changed, or not yet.
+        EndedError
+            The run has ended.
         WaitError
             The run does not answer in time: see `connect`.
         """
-        return Surface(**in_thread(self._reader.client.surface))
+        return Surface(**self._ask(lambda client: client.surface()))
 
     @property
     def pipelines(self) -> list[dict[str, Any]]:
@@ -145,10 +174,12 @@ class Watched:
 
         Raises
         ------
+        EndedError
+            The run has ended.
         WaitError
             The run does not answer in time: see `connect`.
         """
-        pipelines: list[dict[str, Any]] = _json.loads(in_thread(self._reader.client.pipelines))
+        pipelines: list[dict[str, Any]] = _json.loads(self._ask(lambda client: client.pipelines()))
         return pipelines
 
     # ---- Waiting.
@@ -184,33 +215,49 @@ class Watched:
         """
         return self._reader.wait_for(found, timeout)
 
-    def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
+    def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status."""
         return self._reader.carry_out(self._wait_for_cycle(cycle, timeout))
 
-    def _wait_for_cycle(self, cycle: int, timeout: Optional[float]) -> Parts[Status]:
-        def found() -> Optional[Status]:
-            return self._state.status if self._state.status is not None and self._state.status.cycle >= cycle else None
+    def _wait_for_cycle(self, cycle: Cycle, timeout: Optional[float]) -> Parts[Status]:
+        first = number(cycle, "cycle")
 
-        status: Status = yield found, timeout
+        def found() -> Optional[Status]:
+            return self._state.status if self._state.status is not None and self._state.status.cycle >= first else None
+
+        status: Status = yield found, timeout, f"no step from cycle {cycle} on was told"
         return status
 
-    def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
-        """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it."""
+    def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
+        """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it.
+
+        Raises
+        ------
+        KeyError
+            There is no such view.
+        CallError
+            No frames come at all: the run was connected with ``views=False``.
+        WaitError
+            None came in time.
+        """
         return self._reader.carry_out(self._wait_for_view(name, after, timeout))
 
-    def _wait_for_view(self, name: str, after: Optional[int], timeout: Optional[float]) -> Parts[View]:
+    def _wait_for_view(self, name: str, after: Optional[Cycle], timeout: Optional[float]) -> Parts[View]:
+        if not self._has_views:
+            raise CallError(NOT_WANTED)
+        since, patience = None if after is None else number(after, "after"), min(_ANNOUNCED, seconds(timeout))
+
         def found() -> Optional[View]:
-            view = self._state.views.get(name)
-            return view if view is not None and (after is None or view.cycle > after) else None
+            view = self.views.get(name)
+            return view if view is not None and (since is None or view.cycle > since) else None
 
         if self.view_names and name not in self.view_names:
             # A view that was added a moment ago is announced a moment later.
             try:
-                yield (lambda: name in self.view_names), _ANNOUNCED if timeout is None else min(_ANNOUNCED, timeout)
+                yield (lambda: name in self.view_names), patience, "it was not announced"
             except WaitError:
                 raise KeyError(unknown("view", name, self.view_names)) from None
-        view: View = yield found, timeout
+        view: View = yield found, timeout, f"no {'' if after is None else 'newer '}frame of the view '{name}' came"
         return view
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
@@ -219,7 +266,7 @@ class Watched:
 
     def _wait_for_end(self, timeout: Optional[float]) -> Parts[dict[str, Any]]:
         try:
-            end = yield (lambda: self._state.end), timeout
+            end = yield (lambda: self._state.end), timeout, "the run did not end"
         except EndedError:
             end = self._state.end
         return end or {"how": "unknown"}

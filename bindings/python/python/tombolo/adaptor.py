@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, Optional, TypeVar, Union
+from typing import Any, NamedTuple, Optional, SupportsIndex, TypeVar, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ __all__ = ["Adaptor", "Motion", "Steering", "SurfaceMotion"]
 
 Document = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Any]]
 Range = tuple[float, float, float]
-Condition = Literal["inflow", "outflow", "wall"]
 Given = TypeVar("Given")
 # The settings of a run, as the library takes them.
 _Given = tuple[
@@ -53,22 +52,22 @@ class SurfaceMotion:
 
     @property
     def vertices(self) -> NDArray[np.uint32]:
-        """The vertices: numbers into the points that the solver lends."""
+        """The vertices of the boundary, by their numbers among the points that the solver lends."""
         return self._motion.surface_vertices
 
     @property
     def coordinates(self) -> NDArray[np.float64]:
-        """Where each is at the end of the step."""
+        """The coordinates of each vertex of the boundary at the end of the step."""
         return self._motion.surface_coordinates
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """From where it was lent to there."""
+        """How far each vertex of the boundary moves over the step: from the coordinates as they were lent."""
         return self._motion.surface_displacement
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """`displacement / time_step`; 0 in a steady solver."""
+        """The velocity of each vertex of the boundary: `displacement / time_step`; 0 in a steady solver."""
         return self._motion.surface_velocity
 
 
@@ -110,12 +109,12 @@ class Motion:
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """From the coordinates as they were lent to these."""
+        """How far each vertex moves over the step: from the coordinates as they were lent."""
         return self._motion.displacement
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """`displacement / time_step`, for an ALE solver; 0 in a steady one."""
+        """The velocity of each vertex, `displacement / time_step`, for an ALE solver; 0 in a steady one."""
         return self._motion.velocity
 
     @property
@@ -277,7 +276,7 @@ class Adaptor:
         configuration: Optional[Document] = None,
         *,
         parameters: Optional[Mapping[str, Range]] = None,
-        conditions: Optional[Mapping[str, Condition]] = None,
+        conditions: Optional[Mapping[str, str]] = None,
         orders: Optional[Document] = None,
         replay: Optional[Union[str, os.PathLike[str]]] = None,
         output: Optional[Union[str, os.PathLike[str]]] = None,
@@ -306,7 +305,7 @@ class Adaptor:
 
     def execute(
         self,
-        cycle: int,
+        cycle: SupportsIndex,
         time: float,
         time_step: float,
         channels: Union[Mapping[str, Union[Mesh, Mapping[str, Any]]], Mesh],
@@ -355,7 +354,7 @@ class Adaptor:
             return self._still
         return self._still._replace(motion=Motion(motion))
 
-    def looks_at(self, cycle: int, time: float, time_step: float) -> bool:
+    def looks_at(self, cycle: SupportsIndex, time: float, time_step: float) -> bool:
         """Whether anything at this step looks at the mesh and its fields.
 
         A solver that has to compute a field only to show it asks first.

@@ -9,20 +9,21 @@ import threading
 import time as clock
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Generator, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Optional, TypeVar, Union
+from typing import TYPE_CHECKING, Any, Optional, SupportsIndex, TypeVar, Union
 
 from . import _json
-from ._reader import Reader, late
-from ._values import number, whole
+from ._reader import NOT_FOUND, Reader, late
+from ._values import number, seconds, whole
 from ._waiting import Parts, Result, moment_after
 from .errors import CallError
 from .events import check_kinds
-from .orders import Command, Edits, Forecast, Order
+from .orders import Command, Edits, Forecast, Given, Order, id_of
 from .run import WHEEL, Run, _text, left
 from .run import connect as _connect
 
 if TYPE_CHECKING:
     from . import _native
+    from ._watched import Cycle
     from .events import Event
     from .state import Status
     from .views import Surface, View
@@ -73,7 +74,9 @@ class _Waits:
 _WAITS: dict[tuple[asyncio.AbstractEventLoop, Reader], _Waits] = {}
 
 
-async def _wait_for(reader: Reader, found: Callable[[], Found], timeout: Optional[float]) -> Found:
+async def _wait_for(
+    reader: Reader, found: Callable[[], Found], timeout: Optional[float], in_vain: str = NOT_FOUND
+) -> Found:
     """A wait that holds no thread: the one that reads has the loop look again."""
     loop, until = asyncio.get_running_loop(), moment_after(timeout)
     waits = _WAITS.setdefault((loop, reader), _Waits(loop, reader))
@@ -85,7 +88,7 @@ async def _wait_for(reader: Reader, found: Callable[[], Found], timeout: Optiona
                 return answer
             left = until - clock.monotonic()
             if left <= 0:
-                raise late(timeout)
+                raise late(in_vain, timeout)
             timer = None if timeout is None else loop.call_later(left, told.set)
             try:
                 await told.wait()
@@ -97,14 +100,14 @@ async def _wait_for(reader: Reader, found: Callable[[], Found], timeout: Optiona
 async def _carry_out(reader: Reader, parts: Parts[Result]) -> Result:
     """As `Reader.carry_out`, on a loop."""
     try:
-        found, timeout = next(parts)
+        wanted = next(parts)
         while True:
             try:
-                answer = await _wait_for(reader, found, timeout)
+                answer = await _wait_for(reader, *wanted)
             except Exception as error:
-                found, timeout = parts.throw(error)
+                wanted = parts.throw(error)
             else:
-                found, timeout = parts.send(answer)
+                wanted = parts.send(answer)
     except StopIteration as end:
         result: Result = end.value
         return result
@@ -197,14 +200,17 @@ class AsyncOrder:
         self.order = order
 
     def __getattr__(self, name: str) -> Any:
+        # One that is being copied has no order yet, and is asked for Python's own names.
+        if name == "order" or name.startswith("__"):
+            raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
         return getattr(self.order, name)
 
     async def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
-        """As `Order.wait`."""
+        """Wait until the solver has been given its last shape, as `Order.wait` does."""
         return await _carry_out(self.order._run._reader, self.order._wait(timeout, until))
 
     async def cancel(self, *, timeout: Optional[float] = None) -> Command:
-        """As `Order.cancel`."""
+        """Take it back, where it has not begun to move the mesh, and wait until that is done."""
         return await self.order._run.aio.cancel(self.order, timeout=timeout)
 
     def __repr__(self) -> str:
@@ -273,10 +279,13 @@ class AsyncRun:
         schedule: Optional[Mapping[str, Any]] = None,
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
-        replaces: Union[Order, str, None] = None,
-        deadline: Optional[int] = None,
+        replaces: Optional[Given] = None,
+        deadline: Optional[SupportsIndex] = None,
     ) -> AsyncOrder:
-        """As `Run.order`. One that is cancelled while it waits for the wheel is not given."""
+        """Give an order of a new shape, as `Run.order` does.
+
+        A call that is cancelled while it waits for the wheel gives none.
+        """
         prepared = await self._prepared(
             edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline
         )
@@ -285,8 +294,8 @@ class AsyncRun:
     async def _prepared(self, edits: Edits, **settings: Any) -> _native.Prepared:
         return await _in_thread(lambda: self.run._prepared(_text(edits, **settings)))
 
-    async def undo(self, count: int = 1) -> AsyncOrder:
-        """As `Run.undo`."""
+    async def undo(self, count: SupportsIndex = 1) -> AsyncOrder:
+        """Take the last orders back; returns the order that does so, as `Run.undo` does."""
         orders = whole(count, "count", 1)
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
 
@@ -299,17 +308,18 @@ class AsyncRun:
         guard: Optional[Mapping[str, Any]] = None,
         timeout: Optional[float] = None,
     ) -> Forecast:
-        """As `Run.forecast`."""
+        """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes."""
+        seconds(timeout)
         prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
         question = await self._send(lambda client: client.forecast(prepared))
         return await self._carry_out(self.run._foretold(question, timeout))
 
     async def hand_over(self, to: str, timeout: float = 60.0) -> None:
-        """As `Run.hand_over`."""
+        """Give the wheel to another client, as `Run.hand_over` does."""
         await _in_thread(lambda: self.run.hand_over(to, timeout))
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
-        """As `Run.link_for`."""
+        """Make a link for somebody else, as `Run.link_for` does."""
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
     async def _send(self, send: Callable[[_native.Client], str], timeout: Optional[float] = None) -> str:
@@ -323,75 +333,76 @@ class AsyncRun:
 
     async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
         begin = clock.monotonic()
+        seconds(timeout)
         command = Command(self.run, await self._send(send, timeout), task)
         return await self._carry_out(command._wait(left(begin, timeout)))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
-        """As `Run.set`."""
+        """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it."""
         given = number(value, f"parameter {parameter!r}")
         return await self._give(lambda client: client.set(parameter, given), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
-        """As `Run.pause`."""
+        """Hold the solver at its next safe point, and wait until it is held."""
         return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
-        """As `Run.resume`."""
+        """Let the solver go on, and wait until it does."""
         return await self._give(lambda client: client.resume(), "resume", timeout)
 
     async def stop(self, *, timeout: Optional[float] = None) -> Command:
-        """As `Run.stop`."""
+        """Ask the solver to end, and wait until it was told so."""
         return await self._give(lambda client: client.stop(), "stop", timeout)
 
-    async def cancel(self, order: Union[Order, str], *, timeout: Optional[float] = None) -> Command:
-        """As `Run.cancel`."""
-        identity = order.id if isinstance(order, Order) else order
+    async def cancel(self, order: Given, *, timeout: Optional[float] = None) -> Command:
+        """Take back an order that has not begun to move the mesh, as `Run.cancel` does, and wait until that is done."""
+        identity = id_of(order, "order")
         return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
 
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
-        """As `Run.change_pipelines`."""
+        """Change the pipelines while the run goes on, as `Run.change_pipelines` does, and wait until it is done."""
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
     async def drive(self, timeout: Optional[float] = None) -> None:
-        """As `Run.drive`."""
-        until = clock.monotonic() + (WHEEL if timeout is None else timeout)
+        """Take the wheel, as `Run.drive` does."""
+        until = moment_after(WHEEL if timeout is None else timeout)
         while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
             pass
 
     async def surface(self) -> Surface:
-        """As `Run.surface`."""
+        """Ask for the reference surface: what `Run.surface` is."""
         return await _in_thread(lambda: self.run.surface)
 
     async def stack(self) -> list[dict[str, Any]]:
-        """As `Run.stack`."""
+        """Ask for the edits that make the present shape: what `Run.stack` is."""
         return await _in_thread(lambda: self.run.stack)
 
     async def pipelines(self) -> list[dict[str, Any]]:
-        """As `Run.pipelines`."""
+        """Ask for the pipelines as they are now: what `Run.pipelines` is."""
         return await _in_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
-        """As `Run.wait_for`; `found` is called on the loop."""
+        """Wait until `found`, which is called on the loop, returns something true, as `Run.wait_for` does."""
         return await _wait_for(self.run._reader, found, timeout)
 
-    async def wait_for_cycle(self, cycle: int, timeout: Optional[float] = None) -> Status:
-        """As `Run.wait_for_cycle`."""
+    async def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
+        """Wait until the solver has told a step from `cycle` on, and return its status."""
         return await self._carry_out(self.run._wait_for_cycle(cycle, timeout))
 
-    async def wait_for_view(self, name: str, *, after: Optional[int] = None, timeout: Optional[float] = None) -> View:
-        """As `Run.wait_for_view`."""
+    async def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
+        """Wait for a frame of a view, and return it, as `Run.wait_for_view` does."""
         return await self._carry_out(self.run._wait_for_view(name, after, timeout))
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
-        """As `Run.wait`."""
+        """Wait until the run has ended, and return how."""
         return await self._carry_out(self.run._wait_for_end(timeout))
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
-        """As `Run.events`, for `async for`; the wait for one event may be cancelled."""
+        """Iterate over what the run tells from now on by `async for`; the wait for one event may be cancelled."""
         check_kinds(kinds)
         return _Events(self.run, kinds)
 
     async def close(self) -> None:
-        """As `Run.close`."""
+        """Close the connection, without holding the loop up. The run goes on."""
         await _in_thread(self.run.close)

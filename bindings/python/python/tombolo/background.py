@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import time as clock
+import weakref
 from collections.abc import Callable
-from typing import Any, Optional
+from typing import Any, Optional, Union
 
 from .errors import TomboloError
 from .orders import Edits, Order
@@ -17,7 +18,8 @@ __all__ = ["Connection", "Requests", "connection"]
 #: Seconds until a run that was not reached is tried again.
 _AGAIN = 5.0
 
-_CONNECTIONS: dict[str, Connection] = {}
+#: Those that somebody refers to.
+_CONNECTIONS: weakref.WeakValueDictionary[str, Connection] = weakref.WeakValueDictionary()
 _LOCK = threading.Lock()
 
 
@@ -25,7 +27,8 @@ class Connection:
     """A run that a thread of its own connects to. What is not there yet is None.
 
     Once the run has ended it is looked for again: another one may be under way behind the same link, such as a file.
-    Until then all stays as it was. A surface that did not come is asked for again as well.
+    Until then all stays as it was. A surface that did not come is asked for again as well. It lasts as long as anybody
+    refers to it.
 
     Attributes
     ----------
@@ -54,33 +57,56 @@ class Connection:
         is_there = self.run is not None and self.run.connected
         if not (is_there and self.surface is not None) and not is_trying and clock.monotonic() >= self._again:
             self._again = clock.monotonic() + _AGAIN
-            self._thread = threading.Thread(target=self._connect, name="tombolo-connection", daemon=True)
+            arguments = weakref.ref(self), self.link, self.run
+            self._thread = threading.Thread(target=_connect, args=arguments, name="tombolo-connection", daemon=True)
             self._thread.start()
 
-    def _connect(self) -> None:
-        try:
-            run = self.run
-            if run is None or not run.connected:
-                before, run = run, connect(self.link)
-                self.run, self.surface, self.failure = run, None, None
-                if before is not None:
-                    before.close()
-            # Before the first step there is no mesh.
-            run.wait_for(lambda: run.features, None)
-            self.surface, self.failure = run.surface, None
-        except TomboloError as error:
-            self.failure, self._again = str(error), clock.monotonic() + _AGAIN
+    def _begin(self, run: Run) -> None:
+        before, self.run, self.surface, self.failure = self.run, run, None, None
+        if before is not None:
+            before.close()
+
+    def _fail(self, error: Exception) -> None:
+        self.failure, self._again = _said(error), clock.monotonic() + _AGAIN
 
     def __repr__(self) -> str:
         # The link has a secret in it.
         return f"<tombolo.background.Connection to {self.run if self.run is not None else self.failure or 'a run'}>"
 
 
+def _said(error: Exception) -> str:
+    """What is wrong: in the library's words, or in those of an error that it does not expect."""
+    return str(error) if isinstance(error, TomboloError) else f"{type(error).__name__}: {error}"
+
+
+def _connect(known: weakref.ref[Connection], link: str, run: Optional[Run]) -> None:
+    """Connect, and ask for the surface, while anybody refers to the connection: this thread does not."""
+    try:
+        if run is None or not run.connected:
+            run = connect(link)
+            if (connected := known()) is not None:
+                connected._begin(run)
+                del connected
+        of_run = run
+        # Before the first step there is no mesh.
+        run.wait_for(lambda: of_run.features or known() is None)
+        if known() is None:
+            # It closes with this thread, unless somebody refers to the run itself.
+            return
+        surface = run.surface
+        if (connected := known()) is not None:
+            connected.surface, connected.failure = surface, None
+    except Exception as error:
+        # Whatever it is, nobody else would tell it.
+        if (connected := known()) is not None:
+            connected._fail(error)
+
+
 def connection(link: str) -> Optional[Connection]:
     """Find the connection of a link, which all who ask for it share; it never waits.
 
     A connection is begun when it is first asked for. Where the run is not reached, it is tried again later, when it is
-    asked for once more.
+    asked for once more. It is closed once nobody refers to it: keep it as long as it is of use.
 
     Parameters
     ----------
@@ -107,8 +133,13 @@ class Requests:
     """Forecasts, orders and undos, each asked for by a thread of its own, and what has become of the last."""
 
     def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._count = 0
+        # Of each kind the number of the last question, and its answer.
+        self._asked: dict[str, int] = {}
         self._answers: dict[str, str] = {}
-        self._order: Optional[Order] = None
+        # The last order or undo, behind the number of its question.
+        self._order: tuple[int, Optional[Order]] = 0, None
 
     def forecast(self, run: Run, edits: Edits, **settings: Any) -> None:
         """Ask what an order would come to. Parameters as of `Run.forecast`."""
@@ -122,24 +153,35 @@ class Requests:
 
     def order(self, run: Run, edits: Edits, **settings: Any) -> None:
         """Give an order. Parameters as of `Run.order`."""
-        self._begin("order", lambda: self._follow(run.order(edits, **settings)))
+        self._begin("order", lambda: run.order(edits, **settings))
 
     def undo(self, run: Run) -> None:
         """Take the last order back."""
-        self._begin("undo", lambda: self._follow(run.undo()))
+        self._begin("undo", run.undo)
 
-    def _follow(self, order: Order) -> str:
-        self._order = order
-        return f"given as {order.id}"
-
-    def _begin(self, title: str, ask: Callable[[], str]) -> None:
-        self._answers[title] = "asked"
+    def _begin(self, title: str, ask: Callable[[], Union[Order, str]]) -> None:
+        with self._lock:
+            self._count += 1
+            number = self._asked[title] = self._count
+            self._answers[title] = "asked"
 
         def work() -> None:
+            order: Optional[Order] = None
             try:
-                self._answers[title] = ask()
+                answer = ask()
+                if isinstance(answer, Order):
+                    order, answer = answer, f"given as {answer.id}"
             except TomboloError as error:
-                self._answers[title] = f"refused: {error}"
+                answer = f"refused: {error}"
+            except Exception as error:
+                # Whatever it is, nobody else would tell it.
+                answer = f"failed: {_said(error)}"
+            with self._lock:
+                # A later question may have been answered sooner.
+                if self._asked[title] == number:
+                    self._answers[title] = answer
+                if order is not None and self._order[0] < number:
+                    self._order = number, order
 
         threading.Thread(target=work, name=f"tombolo-{title}", daemon=True).start()
 
@@ -150,7 +192,8 @@ class Requests:
         The answers to the last `forecast`, `order` and `undo`; of the last order or undo the `status`, and the `reason`
         where there is one.
         """
-        outcomes, order = dict(self._answers), self._order
+        with self._lock:
+            outcomes, (_, order) = dict(self._answers), self._order
         if order is not None:
             shape, shapes = order.shape
             outcomes["status"] = f"{order.status}, shape {shape} of {shapes}"

@@ -62,7 +62,8 @@ def iterate(
         except CallError:
             return
         except WaitError:
-            raise WaitError(f"none came within {timeout} seconds") from None
+            what = " or ".join(f"'{kind}'" for kind in kinds)
+            raise WaitError(f"no event {what + ' ' if kinds else ''}came within {timeout} seconds") from None
         ended = event.kind == "ended"
         if not kinds or event.kind in kinds:
             yield event
@@ -114,6 +115,9 @@ class Callbacks:
 
         with self._lock:
             chosen = [function for kind, function in self._functions if kind in (None, event.kind)]
+            if event.kind == "ended":
+                # Nothing comes behind it: a function that is added from now on is told by a thread of its own.
+                self._functions, self._run, self._thread = [], None, None
         for function in chosen:
             try:
                 function(event)

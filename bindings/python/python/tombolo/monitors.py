@@ -9,6 +9,7 @@ from typing import Any, Optional
 import numpy as np
 from numpy.typing import NDArray
 
+from ._identity import by_identity
 from ._names import unknown
 
 __all__ = ["MonitorTable", "Monitors"]
@@ -17,6 +18,7 @@ __all__ = ["MonitorTable", "Monitors"]
 ROWS = 1 << 20
 
 
+@by_identity
 class MonitorTable(Mapping[str, NDArray[np.float64]]):
     """The values of a pipeline's monitors: a column for each, beside `cycle` and `time`, a row for each time they ran.
 
@@ -154,14 +156,22 @@ class Monitors(Mapping[str, MonitorTable]):
         return len(self._tables)
 
     def to_pandas(self) -> Any:
-        """All monitors as one `pandas.DataFrame`: by cycle, columns called ``pipeline.monitor``; needs pandas."""
+        """All monitors as one `pandas.DataFrame`: by cycle, columns called ``pipeline.monitor``; needs pandas.
+
+        What was measured at one cycle and time is one row. A cycle that was counted anew, or shown more than once, has
+        a row for each time.
+        """
         import pandas
 
-        frames = [
-            table.to_pandas().drop(columns="time", errors="ignore").add_prefix(f"{name}.")
-            for name, table in self._tables.items()
-        ]
-        return pandas.concat(frames, axis=1).sort_index() if frames else pandas.DataFrame()
+        frames = []
+        for name, table in list(self._tables.items()):
+            frame = table.to_pandas().reset_index()
+            step = [frame["cycle"], frame["time"]]
+            step.append(frame.groupby(step).cumcount())
+            frames.append(frame.drop(columns=["cycle", "time"]).add_prefix(f"{name}.").set_index(step))
+        if not frames:
+            return pandas.DataFrame()
+        return pandas.concat(frames, axis=1).sort_index(level=[1, 0, 2]).droplevel([1, 2])
 
     def __repr__(self) -> str:
         return f"<tombolo.Monitors of {', '.join(self) or 'no pipeline yet'}>"

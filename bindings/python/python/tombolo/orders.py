@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from ._waiting import Parts, moment_after
-from .errors import EndedError, RejectedError, TomboloError
+from .errors import ConfigurationError, EndedError, RejectedError, TomboloError
 
 if TYPE_CHECKING:
+    from .aio import AsyncOrder
     from .run import Run
 
 __all__ = ["Command", "Forecast", "Order"]
@@ -20,6 +21,16 @@ __all__ = ["Command", "Forecast", "Order"]
 _STATUS = 2.0
 #: Edits or a whole order, as Python's values or as a file.
 Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
+#: An order that was given, also in an `async` program, or its id.
+Given = Union["Order", "AsyncOrder", str]
+
+
+def id_of(order: Given, name: str) -> str:
+    """Find the id of an order that a parameter of a name was given."""
+    identity = getattr(order, "id", order)
+    if not isinstance(identity, str):
+        raise ConfigurationError(f"{name}: found {order!r}, expected an order or its id")
+    return identity
 
 
 class Order:
@@ -116,7 +127,7 @@ class Order:
         if until not in stages:
             raise ValueError(f"until: found {until!r}, expected one of: {', '.join(stages)}")
         enough = (*stages[stages.index(until) :], "rejected")
-        yield (lambda: self.status in enough), timeout
+        yield (lambda: self.status in enough), timeout, f"the order {self.id} was not {until}"
         if self.status == "rejected":
             raise RejectedError(self.reason or "no reason given", dict(self.report))
         return self
@@ -237,7 +248,7 @@ class Command:
     def _wait(self, timeout: Optional[float]) -> Parts[Command]:
         until = moment_after(timeout)
         try:
-            answer = yield self._answer, timeout
+            answer = yield self._answer, timeout, f"the command {self.id} ({self.task}) did not take effect"
         except EndedError:
             # A run that was asked to stop may end before it has answered.
             if self.task == "stop":
@@ -249,7 +260,7 @@ class Command:
             # The status comes behind the answer. Somebody else may have had it otherwise by then, or the run may be
             # over: it has taken effect all the same.
             with contextlib.suppress(TomboloError):
-                yield self._is_shown, min(until - clock.monotonic(), _STATUS)
+                yield self._is_shown, max(min(until - clock.monotonic(), _STATUS), 0.0), "it was not shown"
         return self
 
     def _is_shown(self) -> bool:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import time as clock
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, SupportsIndex, Union
 
 from . import _json
-from ._values import number, whole
-from ._waiting import Parts, in_thread
+from ._values import number, seconds, whole
+from ._waiting import Parts, in_thread, moment_after
 from ._watched import Watched
 from .errors import LinkError, NotDriverError, RejectedError, WaitError
-from .orders import Command, Edits, Forecast, Order
+from .orders import Command, Edits, Forecast, Given, Order, id_of
 
 if TYPE_CHECKING:
     from . import _native
@@ -80,7 +80,7 @@ class Run(Watched):
         EndedError, LinkError
             The run has ended, or the connection was lost for good.
         """
-        until = clock.monotonic() + (WHEEL if timeout is None else timeout)
+        until = moment_after(WHEEL if timeout is None else timeout)
         while not self._ask_for_wheel(until, timeout is None):
             pass
 
@@ -108,7 +108,8 @@ class Run(Watched):
 
             run.on("wheel", lambda event: run.hand_over(event.data["asked_by"]))
         """
-        in_thread(lambda: self._reader.client.hand_over(to, timeout))
+        patience = seconds(timeout)
+        self._ask(lambda client: client.hand_over(to, patience))
 
     def _ask_for_wheel(self, until: float, reconnects: bool) -> bool:
         """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then.
@@ -148,8 +149,8 @@ class Run(Watched):
         schedule: Optional[Mapping[str, Any]] = None,
         deform: Optional[Mapping[str, Any]] = None,
         guard: Optional[Mapping[str, Any]] = None,
-        replaces: Union[Order, str, None] = None,
-        deadline: Optional[int] = None,
+        replaces: Optional[Given] = None,
+        deadline: Optional[SupportsIndex] = None,
     ) -> Order:
         """Give an order of a new shape; it is on its way when this returns, and `Order.wait` waits for it.
 
@@ -161,7 +162,7 @@ class Run(Watched):
         schedule, deform, guard : dict, optional
             In how many steps the shape is reached; how the volume follows; what the mesh must keep to. Left out: what
             the run's configuration says.
-        replaces : Order or str, optional
+        replaces : Order, AsyncOrder or str, optional
             An order that has not begun to move the mesh, whose place this one takes; that one is rejected.
         deadline : int, optional
             Seconds that it may wait for its turn, where the run's configuration does not say less; it is rejected then.
@@ -200,27 +201,82 @@ class Run(Watched):
         guard: Optional[Mapping[str, Any]] = None,
         timeout: Optional[float] = None,
     ) -> Forecast:
-        """Ask what an order would come to, were it given now; nothing changes. The parameters are those of `order`."""
+        """Ask what an order would come to, were it given now; nothing changes.
+
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            As of `order`.
+        schedule, deform, guard : dict, optional
+            As of `order`.
+        timeout : float, optional
+            Seconds to wait for the answer, at most.
+
+        Raises
+        ------
+        ConfigurationError
+            Something is wrong with the order: the text has line, column, path and the nearest known name.
+        RejectedError
+            The run does not find out what it would come to, and says why. An order that would be rejected is an answer
+            (`Forecast.outcome`), and none of these.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            No answer came in time.
+        """
+        seconds(timeout)
         prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard))
         self.drive()
         return self._reader.carry_out(self._foretold(self._reader.client.forecast(prepared), timeout))
 
     def _foretold(self, question: str, timeout: Optional[float]) -> Parts[Forecast]:
         """Wait for the answer to a forecast that was asked for."""
-        kind, data = yield (lambda: self._state.answers.get(question)), timeout
+        kind, data = yield (lambda: self._state.answers.get(question)), timeout, "no answer to the forecast came"
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])
 
-    def undo(self, count: int = 1) -> Order:
-        """Take the last orders back; returns the order that does so."""
+    def undo(self, count: SupportsIndex = 1) -> Order:
+        """Take the last orders back; returns the order that does so.
+
+        Parameters
+        ----------
+        count : int
+            How many orders. The shape is the one before them then, to the bit.
+
+        Raises
+        ------
+        ConfigurationError
+            That is no number of orders.
+        NotDriverError
+            Somebody else steers. What else there is against it, such as fewer orders, `Order.wait` says.
+        """
         orders = whole(count, "count", 1)
         self.drive()
         return Order(self, self._reader.client.undo(orders))
 
-    def cancel(self, order: Union[Order, str], *, wait: bool = True, timeout: Optional[float] = None) -> Command:
-        """Take back an order that has not begun to move the mesh: it is rejected then."""
-        identity = order.id if isinstance(order, Order) else order
+    def cancel(self, order: Given, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+        """Take back an order that has not begun to move the mesh: it is rejected then.
+
+        Parameters
+        ----------
+        order : Order, AsyncOrder or str
+            The order, or its id.
+        wait : bool
+            Whether to wait until it has taken effect.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Raises
+        ------
+        RejectedError
+            It moves the mesh already, is over, or never was.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            It did not take effect in time; it may still.
+        """
+        identity = id_of(order, "order")
         return self._give(lambda: self._reader.client.cancel(identity), "cancel", wait, timeout)
 
     def set(self, parameter: str, value: float, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
@@ -236,6 +292,17 @@ class Run(Watched):
             Whether to wait until the solver has it.
         timeout : float, optional
             Seconds to wait, at most.
+
+        Raises
+        ------
+        ConfigurationError
+            The value is no finite number.
+        RejectedError
+            There is no such parameter, or the value is beyond its bounds.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            The solver did not have it in time; it may still.
         """
         given = number(value, f"parameter {parameter!r}")
         return self._give(lambda: self._reader.client.set(parameter, given), "set", wait, timeout)
@@ -271,6 +338,8 @@ class Run(Watched):
 
     def _give(self, give: Callable[[], str], task: str, wait: bool, timeout: Optional[float]) -> Command:
         begin = clock.monotonic()
+        # What is wrong is told before anything is sent.
+        seconds(timeout)
         self.drive(timeout)
         command = Command(self, give(), task)
         return command.wait(left(begin, timeout)) if wait else command
@@ -298,11 +367,12 @@ class Run(Watched):
         RejectedError
             This client may not give such a link.
         """
-        return in_thread(lambda: self._reader.client.link_for(rights, timeout))
+        patience = seconds(timeout)
+        return self._ask(lambda client: client.link_for(rights, patience))
 
     @property
     def aio(self) -> AsyncRun:
-        """The same for `await`: every method that waits, as a coroutine."""
+        """The run for `async` programs: each of its methods that waits is a coroutine there."""
         from .aio import AsyncRun
 
         return AsyncRun(self)
@@ -331,11 +401,11 @@ def _text(
     schedule: Optional[Mapping[str, Any]] = None,
     deform: Optional[Mapping[str, Any]] = None,
     guard: Optional[Mapping[str, Any]] = None,
-    replaces: Union[Order, str, None] = None,
-    deadline: Optional[int] = None,
+    replaces: Optional[Given] = None,
+    deadline: Optional[SupportsIndex] = None,
 ) -> tuple[str, str]:
     """An order as a text with its name."""
-    other = replaces.id if isinstance(replaces, Order) else replaces
+    other = None if replaces is None else id_of(replaces, "replaces")
     settings = {"schedule": schedule, "deform": deform, "guard": guard, "replaces": other, "deadline": deadline}
     return _json.order(edits, settings)
 
@@ -345,7 +415,7 @@ def connect(
     *,
     watch: bool = False,
     views: bool = True,
-    attempts: int = 10,
+    attempts: SupportsIndex = 10,
     timeout: Optional[float] = None,
 ) -> Run:
     """Connect to a run.
@@ -395,5 +465,5 @@ def connect(
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
-    patience = None if timeout is None else number(timeout, "timeout")
-    return Run(text, watch=watch, views=views, attempts=whole(attempts, "attempts", 0), timeout=patience)
+    retries, patience = whole(attempts, "attempts", 0), None if timeout is None else seconds(timeout)
+    return Run(text, watch=watch, views=views, attempts=retries, timeout=patience)

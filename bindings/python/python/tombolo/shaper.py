@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
+from ._identity import by_identity
 from ._waiting import in_thread
 from .errors import MeshError
 from .mesh import Cells, Faces, Mesh, faces_of_features
@@ -26,6 +27,7 @@ Progress = Callable[[float], object]
 """Called about ten times a second with the seconds so far; what it raises ends the work."""
 
 
+@by_identity
 class Shape(NamedTuple):
     """A mesh in another shape.
 
@@ -53,6 +55,7 @@ class Shape(NamedTuple):
         return f"<tombolo.Shape of {len(self.points)} points, least scaled Jacobian {self.quality['min']:.4f}>"
 
 
+@by_identity
 class Skeleton(NamedTuple):
     """The curve skeleton of a surface: polylines along its middle.
 
@@ -84,6 +87,23 @@ _DIMENSIONS = {
 }
 
 
+#: The vertices of a cell of each of meshio's linear types.
+_CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
+
+
+def _check_linear(kind: str) -> None:
+    """An error for meshio's cells with vertices on their edges, and for its polyhedra."""
+    linear = kind.rstrip("0123456789")
+    if linear == "polyhedron":
+        raise MeshError("meshio's mesh: found polyhedra, expected cells of a type such as 'tetra' or 'hexahedron'")
+    if linear != kind and linear in _CORNERS:
+        corners = f"mesh.cells_dict['{kind}'][:, :{_CORNERS[linear]}]"
+        raise MeshError(
+            f"meshio's mesh: found cells of type '{kind}', expected linear cells: their corners alone are "
+            f"{{'{linear}': {corners}}}, beside mesh.points"
+        )
+
+
 def _of_meshio(mesh: Any) -> Mesh:
     # What meshio calls the numbers of Gmsh's groups, and what the program calls those of features in a file of VTK.
     key = next((key for key in ("gmsh:physical", "features") if key in mesh.cell_data), None)
@@ -100,6 +120,8 @@ def _of_meshio(mesh: Any) -> Mesh:
             # 0 is that of no group; one below 0 says that a surface is turned round in its group.
             rows, numbers = rows[first], np.where(numbers == 0, -1, np.abs(numbers))[first]
         parts[kind] = rows, numbers
+    for kind in parts:
+        _check_linear(kind)
     # Faces and edges beside volume cells are of the boundary. A type that is not known is kept, and refused by name.
     most = max((_DIMENSIONS.get(kind, 0) for kind in parts), default=0)
     cells: dict[Union[str, int], ArrayLike] = {
@@ -143,8 +165,31 @@ def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
 _EXPECTED = "a tombolo.Mesh, a mesh of meshio or PyVista, a vtkDataSet, or coordinates with their cells"
 
 
-def _what_it_is(given: object) -> str:
+def _check_faces(faces: Optional[Faces]) -> None:
+    """An error where a feature has no faces, by its name."""
+    for name, given in faces.items() if isinstance(faces, Mapping) else ():
+        parts: Iterable[Any] = given.values() if isinstance(given, Mapping) else [given]
+        if all(hasattr(part, "__len__") and len(part) == 0 for part in parts):
+            raise MeshError(f"the feature '{name}' has no faces, expected at least one")
+
+
+def _blocks(given: Any) -> str:
+    """The blocks of one of VTK's data objects of several, by their names."""
+    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+
+    names = []
+    for number in range(given.GetNumberOfBlocks()):
+        about = given.GetMetaData(number) if given.HasMetaData(number) else None
+        name = None if about is None else about.Get(vtkCompositeDataSet.NAME())
+        names.append(f"block {number}" if name is None else f"'{name}'")
+    return ", ".join(names) or "no block"
+
+
+def _what_it_is(given: Any) -> str:
     """What was given in place of a mesh, and what would have made one of it."""
+    if hasattr(given, "GetNumberOfBlocks"):
+        joined = ", or all together: mesh.combine()" if hasattr(given, "combine") else ""
+        return f"a {type(given).__name__} of {_blocks(given)} (take one of them{joined})"
     if isinstance(given, (str, os.PathLike)):
         return f"the name of a file, '{os.fspath(given)}' (read it first: tombolo.Shaper(meshio.read(...)))"
     if isinstance(given, (np.ndarray, Sequence)):
@@ -208,7 +253,8 @@ class Shaper:
         elif faces is not None:
             raise MeshError("faces: found them without cells, expected both or neither: a mesh has its own parts")
         elif not isinstance(mesh, (Mesh, Mapping)):
-            if hasattr(mesh, "cells_dict") and hasattr(mesh, "point_sets"):
+            # PyVista's meshes have `cells_dict` too, which would be made of all their cells.
+            if hasattr(mesh, "point_sets") and hasattr(mesh, "cells_dict"):
                 mesh = _of_meshio(mesh)
             elif hasattr(mesh, "GetCellData"):
                 from . import vtk
@@ -218,6 +264,7 @@ class Shaper:
                 raise MeshError(f"found {_what_it_is(mesh)}, expected {_EXPECTED}")
         elif isinstance(mesh, Mapping) and "points" not in mesh and len(mesh) != 1:
             raise MeshError(f"found {len(mesh)} meshes ({', '.join(map(str, mesh))}), expected one")
+        _check_faces(mesh.faces if isinstance(mesh, Mesh) else mesh.get("faces"))
         self._shaper = _native.Shaper(mesh, angle)
 
     # ---- What the mesh is.
@@ -240,17 +287,44 @@ class Shaper:
     def quality(self, points: Optional[ArrayLike] = None) -> dict[str, Any]:
         """Measure the scaled Jacobian of the mesh, or of it with other points.
 
+        Parameters
+        ----------
+        points : array of shape (n, 2) or (n, 3), optional
+            A coordinate for each vertex of the mesh, in as many columns as the mesh was given with. Left out: the
+            mesh as it is.
+
         Returns
         -------
         dict
             `min`, `mean`, `max`, how many cells are `inverted`, a `histogram` of 20 classes from -1 to 1, and the
             `worst` cells. Of a mesh with volume cells it is that of those.
+
+        Raises
+        ------
+        MeshError
+            There is not one row for each vertex, another number of columns, or a coordinate that is not finite.
         """
         quality: dict[str, Any] = _json.loads(self._shaper.quality(points))
         return quality
 
     def scaled_jacobians(self, points: Optional[ArrayLike] = None) -> NDArray[np.float64]:
-        """Measure the scaled Jacobian of each cell, `(m,)`; NaN for cells of a lower dimension than the mesh's."""
+        """Measure the scaled Jacobian of each cell of the mesh, or of it with other points.
+
+        Parameters
+        ----------
+        points : array of shape (n, 2) or (n, 3), optional
+            As of `quality`.
+
+        Returns
+        -------
+        array of shape (m,), float64
+            That of each cell, in the order of the cells; NaN for cells of a lower dimension than the mesh's.
+
+        Raises
+        ------
+        MeshError
+            As of `quality`.
+        """
         return self._shaper.scaled_jacobians(points)
 
     # ---- Other shapes.

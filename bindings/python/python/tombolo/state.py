@@ -127,6 +127,10 @@ class State:
             self.stack = data.get("stack", self.stack)
             for monitor in data.get("monitors", []):
                 self.monitors._table(monitor["pipeline"])._announce(monitor["name"])
+            # A view that was not announced before may be announced a moment later.
+            for name in {view["name"] for view in self.hello.get("views", [])}:
+                if all(view["name"] != name for view in data.get("views", [])):
+                    self.views.pop(name, None)
             self.hello = data
         elif kind == "status":
             self.status = Status._of(data)

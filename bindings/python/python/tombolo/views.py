@@ -8,10 +8,13 @@ from typing import Any, Literal, NamedTuple, Optional
 import numpy as np
 from numpy.typing import NDArray
 
+from ._identity import by_identity
 from ._names import unknown
 
 __all__ = ["Surface", "View", "Views"]
 
+#: What is said where frames were not asked for.
+NOT_WANTED = "no frames of views come: the run was connected with views=False"
 #: What meshio calls faces of so many vertices.
 _POLYGONS = {3: "triangle", 4: "quad"}
 
@@ -20,6 +23,7 @@ def _of(fields: Mapping[str, NDArray[np.float64]], associations: Mapping[str, st
     return {name: values for name, values in fields.items() if associations[name] == kind}
 
 
+@by_identity
 class View(NamedTuple):
     """A view at one step: triangles and lines, with fields. It does not change any more: its arrays are read-only.
 
@@ -100,32 +104,38 @@ class Views(Mapping[str, View]):
         The frames, which change while the run goes on.
     announced : callable
         Returns the names of the live views.
+    wanted : bool
+        Whether frames come at all.
     """
 
-    def __init__(self, frames: Mapping[str, View], announced: Callable[[], Sequence[str]]) -> None:
+    def __init__(self, frames: Mapping[str, View], announced: Callable[[], Sequence[str]], wanted: bool = True) -> None:
         self._frames = frames
         self._announced = announced
+        self._wanted = wanted
 
     def __getitem__(self, name: str) -> View:
-        try:
-            return self._frames[name]
-        except KeyError:
-            names = self._announced()
-            if name in names:
-                hint = f"run.wait_for_view({name!r}) waits for it"
-                raise KeyError(f"no frame of the view '{name}' has come yet; {hint}") from None
-            raise KeyError(unknown("view", name, names)) from None
+        if not self._wanted:
+            raise KeyError(NOT_WANTED)
+        names = self._announced()
+        if name not in names:
+            raise KeyError(unknown("view", name, names))
+        frame = self._frames.get(name)
+        if frame is None:
+            raise KeyError(f"no frame of the view '{name}' has come yet; run.wait_for_view({name!r}) waits for it")
+        return frame
 
     def __iter__(self) -> Iterator[str]:
-        return iter(list(self._frames))
+        # A frame of a view that was removed may have been on its way.
+        return iter([name for name in self._announced() if name in self._frames])
 
     def __len__(self) -> int:
-        return len(self._frames)
+        return len(list(iter(self)))
 
     def __repr__(self) -> str:
         return f"<tombolo.Views: {', '.join(self) or 'none has come yet'}>"
 
 
+@by_identity
 class Surface(NamedTuple):
     """The reference surface: what edits are measured from, every bit of it.
 

@@ -36,6 +36,8 @@ __all__ = [
 
 #: VTK's numbers of the faces that features can be of.
 _TRIANGLE, _STRIP, _POLYGON, _PIXEL, _QUAD = 5, 6, 7, 8, 9
+#: Its number of polyhedra, and those of the cells with vertices on their edges that PyVista makes linear.
+_POLYHEDRON, _QUADRATIC = 42, range(21, 38)
 #: Shapers that are kept, the last ones used.
 _KEPT = 4
 
@@ -214,6 +216,7 @@ def to_mesh(data: Any) -> Mesh:
     # The older name was given up.
     is_new = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) >= (9, 6)
     types = vtk_to_numpy(grid.GetCellTypes() if is_new else grid.GetCellTypesArray())
+    _check_types(types)
     faces = vertex_features = None
     if (numbers := array(data.GetCellData(), "features")) is not None:
         parts = _faces(connectivity, offsets, types, numbers)
@@ -226,6 +229,17 @@ def to_mesh(data: Any) -> Mesh:
         faces=faces,
         vertex_features=vertex_features,
     )
+
+
+def _check_types(types: NDArray[Any]) -> None:
+    """An error for polyhedra, and for cells with vertices on their edges."""
+    for number in np.unique(types).tolist():
+        found = f"the data object of VTK: found {np.count_nonzero(types == number)}"
+        if number == _POLYHEDRON:
+            raise MeshError(f"{found} polyhedra, expected cells of other types, such as tetrahedra or hexahedra")
+        if number in _QUADRATIC:
+            hint = "linear cells: of PyVista's grids, mesh.linear_copy()"
+            raise MeshError(f"{found} quadratic cells (VTK's type {number}), expected {hint}")
 
 
 def _faces(
