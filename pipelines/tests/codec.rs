@@ -328,7 +328,10 @@ fn frames_of_all_kinds_have_the_bytes_that_they_always_had() {
         let x = (3.0 * x + 0.05 * frame).rem_euclid(2.0) - 1.0;
         x * (1.0 - x.abs())
     };
-    let noise = |index: usize| ((index * 7919 + index * index % 613) % 1000) as f64 / 1000.0 - 0.5;
+    let noise = |index: usize| {
+        let index = index as u64;
+        ((index * 7919 + index * index % 613) % 1000) as f64 / 1000.0 - 0.5
+    };
     let value = |kind: usize, at: [f64; 3], index: usize, frame: f64| match kind {
         // Smooth, noisy, mostly zero, and with values that no step reaches.
         0 => wave(at[0] + at[1] * at[1], frame),
