@@ -59,6 +59,8 @@ const NEARLY_TWICE: f64 = 2.0 * (1.0 - 1e-9);
 pub struct Field {
     components: usize,
     known: Known,
+    /// Room for the values of a frame in order, which is kept for the next one.
+    ordered: Vec<f64>,
 }
 
 /// The frame before, as both sides have it.
@@ -73,7 +75,7 @@ impl Field {
     /// A field with tuples of so many values, of which nothing is known.
     #[must_use]
     pub fn new(components: usize) -> Self {
-        Self { components, known: Known::Nothing }
+        Self { components, known: Known::Nothing, ordered: Vec::new() }
     }
 
     /// How many values a tuple has.
@@ -246,7 +248,8 @@ impl Field {
             }
         }
         grid.mask = mask;
-        let ordered = in_order(values, components, order);
+        let mut ordered = std::mem::take(&mut self.ordered);
+        put_in_order(values, components, order, &mut ordered);
         let lists = || ordered.chunks_exact(order.len().max(1));
         let exponent = grid.exponent;
         let wanted = |values, offset| Wanted { values, offset, exponent, bound };
@@ -275,6 +278,7 @@ impl Field {
         }
         grid.frames = grid.frames.saturating_add(1);
         self.known = Known::Grid(grid);
+        self.ordered = ordered;
         Ok(exceptions)
     }
 
@@ -423,23 +427,27 @@ impl Field {
     }
 }
 
-/// The values place after place, one component after the other.
-fn in_order(values: &[f64], components: usize, order: &[u32]) -> Vec<f64> {
+/// Puts the values place after place, one component after the other.
+fn put_in_order(values: &[f64], components: usize, order: &[u32], ordered: &mut Vec<f64>) {
+    ordered.resize(values.len(), 0.0);
     match components {
-        1 => in_order_of::<1>(values, order),
-        2 => in_order_of::<2>(values, order),
-        3 => in_order_of::<3>(values, order),
+        1 => put_in_order_of::<1>(values, order, ordered),
+        2 => put_in_order_of::<2>(values, order, ordered),
+        3 => put_in_order_of::<3>(values, order, ordered),
         _ => {
-            let value = |component| move |&at: &u32| values[at as usize * components + component];
-            (0..components).flat_map(|component| order.iter().map(value(component))).collect()
+            let lists = ordered.chunks_exact_mut(order.len().max(1));
+            for (component, list) in lists.enumerate() {
+                for (to, &at) in list.iter_mut().zip(order) {
+                    *to = values[at as usize * components + component];
+                }
+            }
         }
     }
 }
 
 /// The values of tuples of so many, place after place, one component after the other; each is looked
 /// up once.
-fn in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32]) -> Vec<f64> {
-    let mut ordered = vec![0.0; COMPONENTS * order.len()];
+fn put_in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32], ordered: &mut [f64]) {
     let mut lists = ordered.chunks_exact_mut(order.len().max(1));
     let mut lists: [&mut [f64]; COMPONENTS] =
         std::array::from_fn(|_| lists.next().unwrap_or_default());
@@ -448,7 +456,6 @@ fn in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32]) -> Vec<f6
         let tuple = tuples[at as usize];
         lists.iter_mut().zip(tuple).for_each(|(list, value)| list[place] = value);
     }
-    ordered
 }
 
 const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");

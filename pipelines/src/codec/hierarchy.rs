@@ -4,10 +4,9 @@ use std::ops::Range;
 
 use tombolo_deform::lanes::{LANES, with_wide_registers};
 
-use super::kriging::{NEIGHBOURS, Neighbours, square, weights};
+use super::graph::{Graph, Level, coarsen};
+use super::kriging::{Four, NEIGHBOURS, square, weights};
 
-/// The most neighbours of a point that are looked at.
-const MOST_NEIGHBOURS: usize = 32;
 /// A level with no more points than this is not made coarser.
 const COARSEST: usize = 48;
 /// The most levels.
@@ -37,64 +36,8 @@ pub(super) struct Stencil {
     pub(super) weights: [f32; NEIGHBOURS],
 }
 
-/// Lists of neighbours, rising, one list after the other.
-#[derive(Debug, Clone)]
-struct Graph {
-    starts: Vec<u32>,
-    neighbours: Vec<u32>,
-}
-
-impl Graph {
-    /// The graph of edges in both directions; of each list only the beginning.
-    #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-    fn new(count: usize, edges: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let mut ends = vec![0u32; count + 1];
-        for [a, b] in edges.clone() {
-            ends[a as usize + 1] += 1;
-            ends[b as usize + 1] += 1;
-        }
-        for index in 0..count {
-            ends[index + 1] += ends[index];
-        }
-        let mut all = vec![0u32; ends[count] as usize];
-        let mut next = ends.clone();
-        for [a, b] in edges {
-            for [a, b] in [[a, b], [b, a]] {
-                all[next[a as usize] as usize] = b;
-                next[a as usize] += 1;
-            }
-        }
-        let (mut starts, mut neighbours) = (vec![0u32], Vec::with_capacity(all.len() / 2));
-        for point in 0..count {
-            let list = &mut all[ends[point] as usize..ends[point + 1] as usize];
-            list.sort_unstable();
-            let before = neighbours.len();
-            for &neighbour in &*list {
-                let last = neighbours[before..].last();
-                if neighbours.len() - before < MOST_NEIGHBOURS
-                    && neighbour as usize != point
-                    && last != Some(&neighbour)
-                {
-                    neighbours.push(neighbour);
-                }
-            }
-            starts.push(neighbours.len() as u32);
-        }
-        Self { starts, neighbours }
-    }
-
-    fn of(&self, point: u32) -> &[u32] {
-        let point = point as usize;
-        &self.neighbours[self.starts[point] as usize..self.starts[point + 1] as usize]
-    }
-}
-
-/// One level: its points by their numbers in the whole, what is kept of them, and the colours of the
-/// rest, from 1.
-struct Level {
-    graph: Graph,
-    points: Vec<u32>,
-    colours: Vec<u8>,
+impl Stencil {
+    const NONE: Self = Self { places: [0; NEIGHBOURS], weights: [0.0; NEIGHBOURS] };
 }
 
 impl Hierarchy {
@@ -119,31 +62,20 @@ impl Hierarchy {
             levels.push(level);
         }
 
-        let mut builder = Builder {
-            places,
-            place_of: vec![0; count],
-            order: Vec::with_capacity(count),
-            stencils: Vec::with_capacity(count),
-            counts: Vec::with_capacity(count),
-        };
-        for (index, &point) in points.iter().enumerate() {
-            let earlier = &points[index.saturating_sub(COARSEST)..index];
-            builder.push(point, earlier.iter().copied());
+        let mut order = Vec::with_capacity(count);
+        order.extend(&points);
+        levels.iter().rev().for_each(|level| level.put_in_order(&mut order));
+        let mut place_of = vec![0; count];
+        for (place, &point) in (0u32..).zip(&order) {
+            place_of[point as usize] = place;
         }
-        let mut near = Vec::new();
-        for level in levels.iter().rev() {
-            let most = level.colours.iter().copied().max().unwrap_or(0);
-            let mut by_colour: Vec<Vec<u32>> = vec![Vec::new(); usize::from(most) + 1];
-            for (local, &colour) in (0u32..).zip(&level.colours) {
-                by_colour[usize::from(colour)].push(local);
-            }
-            let mut last = vec![u32::MAX; level.points.len()];
-            for local in by_colour.into_iter().skip(1).flatten() {
-                level.near(local, &mut last, &mut near);
-                builder.push(level.points[local as usize], near.iter().copied());
-            }
-        }
-        builder.finish()
+        let mut stencils = vec![Stencil::NONE; count];
+        with_wide_registers(
+            #[inline(always)]
+            || set_stencils(places, &place_of, &points, &levels, &mut stencils),
+        );
+        let runs = runs(&stencils);
+        Self { order, stencils, runs }
     }
 
     /// How many points there are.
@@ -181,121 +113,142 @@ impl Hierarchy {
     }
 }
 
-/// A level, and the next coarser one: a maximal set of points of which no two are neighbours. Each
-/// other point belongs to its first neighbour in it; two points of it are neighbours where points
-/// that belong to them are.
-#[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-fn coarsen(graph: Graph, points: Vec<u32>) -> (Level, Graph, Vec<u32>) {
-    const UNSEEN: u32 = u32::MAX;
-    let count = points.len() as u32;
-    // The number in the coarser level of what each point belongs to.
-    let mut owner = vec![UNSEEN; points.len()];
-    let mut kept = Vec::new();
-    let mut colours = vec![0u8; points.len()];
-    let mut is_kept = vec![false; points.len()];
-    for point in 0..count {
-        let first = graph.of(point).iter().find(|&&other| is_kept[other as usize]);
-        if let Some(&first) = first {
-            owner[point as usize] = owner[first as usize];
-            continue;
+/// Gives all points their stencils. They are looked at in the order of their numbers, in which those
+/// that are near each other lie near each other in memory.
+#[inline(always)]
+fn set_stencils(
+    places: &[[i32; 3]],
+    place_of: &[u32],
+    coarsest: &[u32],
+    levels: &[Level],
+    stencils: &mut [Stencil],
+) {
+    let mut weighing = Weighing { fours: [const { Waiting::NONE }; NEIGHBOURS + 1], stencils };
+    for (index, &point) in coarsest.iter().enumerate() {
+        let mut nearest = Nearest::to(places[point as usize]);
+        for &earlier in &coarsest[index.saturating_sub(COARSEST)..index] {
+            nearest.look(places[earlier as usize], earlier);
         }
-        is_kept[point as usize] = true;
-        owner[point as usize] = kept.len() as u32;
-        kept.push(points[point as usize]);
+        weighing.add(place_of[point as usize], &nearest, places, place_of);
     }
-    for point in 0..count {
-        if is_kept[point as usize] {
-            continue;
-        }
-        let mut used = 0u64;
-        for &other in graph.of(point) {
-            used |= 1 << colours[other as usize];
-        }
-        // Colour 0 is that of points that are kept, or have none yet.
-        colours[point as usize] = ((used | 1).trailing_ones() as u8).min(63);
-    }
-    let edges = (0..count).flat_map(|point| {
-        let (graph, owner) = (&graph, &owner);
-        graph.of(point).iter().filter_map(move |&other| {
-            let edge = [owner[point as usize], owner[other as usize]];
-            (edge[0] < edge[1]).then_some(edge)
-        })
-    });
-    let coarser = Graph::new(kept.len(), edges);
-    (Level { graph, points, colours }, coarser, kept)
-}
-
-impl Level {
-    /// The points of the level that are coded before this one and no further than two edges away,
-    /// by their numbers in the whole. `last` is for each point the one that last looked at it.
-    fn near(&self, point: u32, last: &mut [u32], near: &mut Vec<u32>) {
-        near.clear();
-        let colour = self.colours[point as usize];
-        let mut look = |other: u32| {
-            let is_new = std::mem::replace(&mut last[other as usize], point) != point;
-            if is_new && self.colours[other as usize] < colour {
-                near.push(self.points[other as usize]);
-            }
-        };
-        for &other in self.graph.of(point) {
-            look(other);
-            self.graph.of(other).iter().for_each(|&further| look(further));
-        }
-    }
-}
-
-struct Builder<'places> {
-    places: &'places [[i32; 3]],
-    place_of: Vec<u32>,
-    order: Vec<u32>,
-    stencils: Vec<Stencil>,
-    /// How many neighbours each stencil has.
-    counts: Vec<u8>,
-}
-
-impl Builder<'_> {
-    /// Adds the next point, which is predicted from the nearest of those, all different.
-    #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-    fn push(&mut self, point: u32, earlier: impl Iterator<Item = u32>) {
-        let at = self.places[point as usize];
-        // The nearest, by distance and then by number.
-        let mut nearest = [(f64::INFINITY, u32::MAX); NEIGHBOURS];
-        let mut count = 0;
-        for other in earlier {
-            let new = (square(self.places[other as usize], at), other);
-            let is_before = |a: (f64, u32), b: (f64, u32)| a.0 < b.0 || (a.0 == b.0 && a.1 < b.1);
-            if !is_before(new, nearest[NEIGHBOURS - 1]) {
+    for level in levels {
+        let mut last = vec![u32::MAX; level.points.len()];
+        for (local, &point) in (0u32..).zip(&level.points) {
+            let colour = level.colours[local as usize];
+            if colour == 0 {
                 continue;
             }
-            let mut index = count.min(NEIGHBOURS - 1);
-            while index > 0 && is_before(new, nearest[index - 1]) {
-                nearest[index] = nearest[index - 1];
-                index -= 1;
+            let mut nearest = Nearest::to(places[point as usize]);
+            let mut look = |other: u32| {
+                if level.colours[other as usize] < colour
+                    && std::mem::replace(&mut last[other as usize], local) != local
+                {
+                    let other = level.points[other as usize];
+                    nearest.look(places[other as usize], other);
+                }
+            };
+            for &other in level.graph.of(local) {
+                look(other);
+                level.graph.of(other).iter().for_each(|&further| look(further));
             }
-            nearest[index] = new;
-            count = (count + 1).min(NEIGHBOURS);
+            weighing.add(place_of[point as usize], &nearest, places, place_of);
         }
-        // Behind the last stands the nearest again, with no weight.
-        let first = nearest[..count].first().map_or(0, |&(_, other)| self.place_of[other as usize]);
-        let mut places = [first; NEIGHBOURS];
-        for (place, &(_, other)) in places.iter_mut().zip(&nearest[..count]) {
-            *place = self.place_of[other as usize];
-        }
-        self.place_of[point as usize] = self.order.len() as u32;
-        self.order.push(point);
-        self.stencils.push(Stencil { places, weights: [0.0; NEIGHBOURS] });
-        self.counts.push(count as u8);
+    }
+    weighing.finish();
+}
+
+/// The nearest of the points that were looked at, by distance and then by number.
+struct Nearest {
+    to: [i32; 3],
+    squares: [f64; NEIGHBOURS],
+    points: [u32; NEIGHBOURS],
+    count: usize,
+}
+
+impl Nearest {
+    #[inline(always)]
+    fn to(to: [i32; 3]) -> Self {
+        let (squares, points) = ([f64::INFINITY; NEIGHBOURS], [u32::MAX; NEIGHBOURS]);
+        Self { to, squares, points, count: 0 }
     }
 
-    fn finish(self) -> Hierarchy {
-        let Self { places, order, mut stencils, counts, .. } = self;
-        let places: Vec<[i32; 3]> = order.iter().map(|&point| places[point as usize]).collect();
-        with_wide_registers(
-            #[inline(always)]
-            || set_weights(&places, &counts, &mut stencils),
-        );
-        let runs = runs(&stencils);
-        Hierarchy { order, stencils, runs }
+    /// Looks at another point, which is at this place.
+    #[inline(always)]
+    fn look(&mut self, place: [i32; 3], point: u32) {
+        let square = square(place, self.to);
+        let Self { squares, points, count, .. } = self;
+        let is_before = |a: f64, of: u32| square < a || (square == a && point < of);
+        if !is_before(squares[NEIGHBOURS - 1], points[NEIGHBOURS - 1]) {
+            return;
+        }
+        let mut index = (*count).min(NEIGHBOURS - 1);
+        while index > 0 && is_before(squares[index - 1], points[index - 1]) {
+            (squares[index], points[index]) = (squares[index - 1], points[index - 1]);
+            index -= 1;
+        }
+        (squares[index], points[index]) = (square, point);
+        *count = (*count + 1).min(NEIGHBOURS);
+    }
+}
+
+/// Points that wait until there are four with as many neighbours.
+#[derive(Clone, Copy)]
+struct Waiting {
+    count: usize,
+    /// Where each stands, and the places of its neighbours.
+    places: [(u32, [u32; NEIGHBOURS]); LANES],
+    four: Four,
+}
+
+impl Waiting {
+    const NONE: Self = Self { count: 0, places: [(0, [0; NEIGHBOURS]); LANES], four: Four::NONE };
+}
+
+/// Weighs the neighbours of points, four points at a time.
+struct Weighing<'a> {
+    fours: [Waiting; NEIGHBOURS + 1],
+    stencils: &'a mut [Stencil],
+}
+
+impl Weighing<'_> {
+    /// Takes the point that stands at a place of the order, with its nearest.
+    #[inline(always)]
+    fn add(&mut self, place: u32, nearest: &Nearest, at: &[[i32; 3]], place_of: &[u32]) {
+        let count = nearest.count;
+        let waiting = &mut self.fours[count];
+        let lane = waiting.count;
+        let mut places = [0; NEIGHBOURS];
+        for (index, &point) in nearest.points[..count].iter().enumerate() {
+            places[index] = place_of[point as usize];
+            waiting.four.set(lane, index, at[point as usize], nearest.squares[index]);
+        }
+        // Behind the last stands the nearest again, with no weight.
+        let first = places[0];
+        places[count..].fill(first);
+        waiting.places[lane] = (place, places);
+        waiting.count = lane + 1;
+        if waiting.count == LANES {
+            waiting.put(count, self.stencils);
+        }
+    }
+
+    #[inline(always)]
+    fn finish(mut self) {
+        for (count, waiting) in self.fours.iter_mut().enumerate() {
+            waiting.put(count, self.stencils);
+        }
+    }
+}
+
+impl Waiting {
+    /// Gives those that wait their stencils; each has so many neighbours.
+    #[inline(always)]
+    fn put(&mut self, neighbours: usize, stencils: &mut [Stencil]) {
+        let weights = weights(&self.four, neighbours);
+        for (&(place, places), weights) in self.places[..self.count].iter().zip(weights) {
+            stencils[place as usize] = Stencil { places, weights };
+        }
+        self.count = 0;
     }
 }
 
@@ -314,27 +267,6 @@ fn runs(stencils: &[Stencil]) -> Vec<u32> {
         runs.push(stencils.len() as u32);
     }
     runs
-}
-
-/// Weighs the neighbours of stencils, four at a time.
-#[inline(always)]
-fn set_weights(places: &[[i32; 3]], counts: &[u8], stencils: &mut [Stencil]) {
-    for (chunk, four) in stencils.chunks_mut(LANES).enumerate() {
-        let mut of = [Neighbours::NONE; LANES];
-        for (lane, of) in of.iter_mut().enumerate() {
-            // Behind the last one stand copies of it.
-            let index = lane.min(four.len() - 1);
-            let place = LANES * chunk + index;
-            of.count = usize::from(counts[place]);
-            for neighbour in 0..NEIGHBOURS {
-                of.places[neighbour] = places[four[index].places[neighbour] as usize];
-                of.squares[neighbour] = square(of.places[neighbour], places[place]);
-            }
-        }
-        for (stencil, weights) in four.iter_mut().zip(weights(&of)) {
-            stencil.weights = weights;
-        }
-    }
 }
 
 #[cfg(test)]

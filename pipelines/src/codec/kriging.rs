@@ -24,39 +24,37 @@ pub(super) fn square(a: [i32; 3], b: [i32; 3]) -> f64 {
     x * x + y * y + z * z
 }
 
-/// The neighbours that a value is predicted from, the nearest first: their places, and the squares of
-/// their distances.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbours {
-    pub(super) places: [[i32; 3]; NEIGHBOURS],
-    pub(super) squares: [f64; NEIGHBOURS],
-    pub(super) count: usize,
+/// The neighbours that four values are predicted from, the nearest first: their places, and the squares
+/// of their distances.
+#[derive(Clone, Copy)]
+pub(super) struct Four {
+    places: [[[i32; LANES]; 3]; NEIGHBOURS],
+    squares: [Lanes; NEIGHBOURS],
 }
 
-impl Neighbours {
+impl Four {
     pub(super) const NONE: Self =
-        Self { places: [[0; 3]; NEIGHBOURS], squares: [0.0; NEIGHBOURS], count: 0 };
+        Self { places: [[[0; LANES]; 3]; NEIGHBOURS], squares: [Lanes::ZERO; NEIGHBOURS] };
+
+    /// Sets a neighbour of one of the four.
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, index: usize, place: [i32; 3], square: f64) {
+        for (axis, steps) in place.into_iter().enumerate() {
+            self.places[index][axis][lane] = steps;
+        }
+        self.squares[index].0[lane] = square;
+    }
 }
 
-/// The weights of four lists of neighbours, in single precision; zero behind the last.
+/// The weights of so many neighbours of each of the four, in single precision; zero behind the last.
 #[inline(always)]
-pub(super) fn weights(of: &[Neighbours; LANES]) -> [[f32; NEIGHBOURS]; LANES] {
-    let count = of[0].count;
-    if of.iter().all(|neighbours| neighbours.count == count) {
-        return of_as_many(of);
-    }
-    let mut weights = [[0.0; NEIGHBOURS]; LANES];
-    for lane in 0..LANES {
-        weights[lane] = of_as_many(&[of[lane]; LANES])[lane];
-    }
-    weights
-}
-
-/// The weights of four lists of equal length.
-#[inline(always)]
-fn of_as_many(of: &[Neighbours; LANES]) -> [[f32; NEIGHBOURS]; LANES] {
-    let count = of[0].count;
-    let (solved, is_sound) = solve(of, count);
+pub(super) fn weights(of: &Four, count: usize) -> [[f32; NEIGHBOURS]; LANES] {
+    let (solved, is_sound) = if count == NEIGHBOURS {
+        // The number is known when it is compiled: most have as many.
+        solve(of, NEIGHBOURS)
+    } else {
+        solve(of, count)
+    };
     let equal = 1.0 / count.max(1) as f64;
     let mut weights = [[0.0; NEIGHBOURS]; LANES];
     for lane in 0..LANES {
@@ -75,18 +73,13 @@ fn of_as_many(of: &[Neighbours; LANES]) -> [[f32; NEIGHBOURS]; LANES] {
 /// all coincide.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
-fn solve(of: &[Neighbours; LANES], count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
+fn solve(of: &Four, count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
     let mut is_sound = [count >= 2; LANES];
-    let (mut mean, mut squares) = (Lanes::ZERO, [Lanes::ZERO; NEIGHBOURS]);
+    let mut mean = Lanes::ZERO;
     let mut places = [[Lanes::ZERO; 3]; NEIGHBOURS];
     for row in 0..count {
-        for lane in 0..LANES {
-            squares[row].0[lane] = of[lane].squares[row];
-            for axis in 0..3 {
-                places[row][axis].0[lane] = f64::from(of[lane].places[row][axis]);
-            }
-        }
-        mean += squares[row].sqrt();
+        places[row] = of.places[row].map(|axis| Lanes(axis.map(f64::from)));
+        mean += of.squares[row].sqrt();
     }
     mean = mean / Lanes::all(count as f64);
     for lane in 0..LANES {
@@ -108,7 +101,7 @@ fn solve(of: &[Neighbours; LANES], count: usize) -> ([Lanes; NEIGHBOURS], [bool;
             matrix[row][column] = covariance(x * x + y * y + z * z);
         }
         matrix[row][row] = Lanes::all(SILL + NUGGET);
-        right[row] = covariance(squares[row]);
+        right[row] = covariance(of.squares[row]);
     }
     for row in 0..count {
         for column in 0..row {
@@ -158,12 +151,11 @@ mod tests {
     use super::*;
 
     fn of(places: &[[i32; 3]], at: [i32; 3]) -> [f32; NEIGHBOURS] {
-        let mut neighbours = Neighbours { count: places.len(), ..Neighbours::NONE };
+        let mut four = Four::NONE;
         for (index, &place) in places.iter().enumerate() {
-            neighbours.places[index] = place;
-            neighbours.squares[index] = square(place, at);
+            four.set(1, index, place, square(place, at));
         }
-        weights(&[neighbours; LANES])[0]
+        weights(&four, places.len())[1]
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod connectivity;
 mod error;
 mod exact;
 mod field;
+mod graph;
 mod grid;
 mod hierarchy;
 mod known;

@@ -7,7 +7,7 @@ use super::CodecError;
 use super::bytes::{Input, put_count};
 use super::hierarchy::BLOCK;
 use super::node::Node;
-use super::prediction::sums_of;
+use super::prediction::{sums_of, sums_of_some};
 use super::rans::{Decoder, Numbers, encode};
 use super::run::{Around, CLASSES, Run};
 use super::tables::TABLES;
@@ -132,8 +132,12 @@ impl Plane {
     ) -> Vec<usize> {
         let points = self.nodes.len();
         let stencils = around.hierarchy.stencils();
-        let ways =
-            around.follows.then(|| Ways::new(&self.nodes, stencils, around.mask, around.step));
+        // Not by a closure, which would not be compiled for wide registers.
+        let ways = if around.follows {
+            Some(Ways::new(&self.nodes, stencils, around.mask, around.step))
+        } else {
+            None
+        };
         let mut modes = match &ways {
             Some(ways) => ways.modes(points),
             None => Modes::uniform(SPACE),
@@ -150,13 +154,17 @@ impl Plane {
         let mut numbers = Numbers::new(CLASSES, points);
         let mut beyond = Vec::new();
         for run in around.hierarchy.runs() {
+            let mask = around.mask.map(|mask| &mask[run.clone()]);
+            sums_of(&self.nodes, &stencils[run.clone()], mask, &mut known);
             if let Some(ways) = &ways
                 && run.start % BLOCK == 0
             {
                 // Neighbours in this block are taken as they are, not as they will be coded.
                 let block = run.start..points.min(run.start + BLOCK);
                 let mask = around.mask.map(|mask| &mask[block.clone()]);
-                sums_of(&self.nodes, &stencils[block.clone()], mask, &mut known);
+                let behind = run.len().next_multiple_of(stride);
+                let others = &stencils[block.clone()];
+                sums_of_some(&self.nodes, others, mask, (behind, stride), &mut known);
                 let mut costs = [0.0; 4];
                 for (index, point) in block.enumerate().step_by(stride) {
                     if mask.is_none_or(|mask| !mask[index]) {
@@ -166,9 +174,6 @@ impl Plane {
                 let mode = cheapest(costs);
                 modes.push(mode);
                 by = modes.coefficients(mode);
-            } else {
-                let mask = around.mask.map(|mask| &mask[run.clone()]);
-                sums_of(&self.nodes, &stencils[run.clone()], mask, &mut known);
             }
             current.take(&self.nodes, &around, run, &known);
             current.predict(by);

@@ -38,6 +38,22 @@ pub(super) fn sums_of(
     }
 }
 
+/// The sums as [`sums_of`] has them, of some points: from the first on, and then after each stride.
+#[inline(always)]
+pub(super) fn sums_of_some(
+    nodes: &[Node],
+    stencils: &[Stencil],
+    mask: Option<&[bool]>,
+    (first, stride): (usize, usize),
+    sums: &mut [Node; BLOCK],
+) {
+    for index in (first..stencils.len()).step_by(stride) {
+        if mask.is_none_or(|mask| !mask[index]) {
+            sum(nodes, &stencils[index], &CONTEXT, &mut sums[index]);
+        }
+    }
+}
+
 /// The sums of the next points of a list, as many as there is room for.
 #[inline(always)]
 pub(super) fn sums_of_each<'sums>(

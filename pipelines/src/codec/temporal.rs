@@ -1,5 +1,7 @@
 //! How earlier frames are used: which of four ways serves each block of points best.
 
+use tombolo_deform::lanes::Lanes;
+
 use super::CodecError;
 use super::bytes::Input;
 use super::hierarchy::{BLOCK, Stencil};
@@ -7,7 +9,9 @@ use super::node::Node;
 use super::prediction::{Coefficients, sums_of_each};
 
 /// The coefficients are fitted to about so many points: they say nearly as much as all.
-const FITTED_TO: usize = 4096;
+const FITTED_TO: usize = 1024;
+/// How often they are fitted.
+const ROUNDS: usize = 3;
 /// Neighbours alone.
 pub(super) const SPACE: u8 = 0;
 /// The ways that are fixed: neighbours alone; the last frame alone; the last frame and how the
@@ -118,7 +122,7 @@ impl Ways {
         mask: Option<&[bool]>,
         step: f32,
     ) -> Self {
-        let fitted = fit(nodes, stencils, mask);
+        let fitted = fit(nodes, stencils, mask, step);
         let fit = fitted.map(|part| f32::from(part) / PARTS);
         let ways = [FIXED[0], FIXED[1], FIXED[2], fit];
         let coefficients = [0, 1, 2, 3].map(|index| ways.map(|way| way[index]));
@@ -163,32 +167,57 @@ fn logarithm(number: f32) -> f32 {
     (number.to_bits() as i32 as f32) * (1.0 / 8_388_608.0) - 127.0
 }
 
-/// The coefficients with the least squares of what is left.
-#[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
+/// The coefficients with about the least sum of what is left, which is about what it costs. Squares
+/// would be above all those of a few points: each point has the weight of the inverse of what the
+/// last coefficients left of it, at first of what the fixed ways did.
 #[inline(always)]
-fn fit(nodes: &[Node], stencils: &[Stencil], mask: Option<&[bool]>) -> [i8; 4] {
-    let (mut matrix, mut right) = ([[0.0f64; 4]; 4], [0.0f64; 4]);
-    let stride = nodes.len().div_ceil(FITTED_TO).max(1);
+fn fit(nodes: &[Node], stencils: &[Stencil], mask: Option<&[bool]>, step: f32) -> [i8; 4] {
+    let masked = mask.map_or(0, |mask| mask.iter().filter(|&&is_masked| is_masked).count());
+    let stride = (nodes.len() - masked).div_ceil(FITTED_TO).max(1);
     let mut points =
         (0..nodes.len()).step_by(stride).filter(|&point| mask.is_none_or(|mask| !mask[point]));
+    let mut samples = Vec::with_capacity(FITTED_TO);
     let mut several = [(0, Node::ZERO); BLOCK];
     loop {
         let several = sums_of_each(nodes, stencils, &mut points, &mut several);
         for &(point, sums) in several {
-            let [_, now, before, earlier] = sums.0.map(f64::from);
-            let [_, value, last, second] = nodes[point].0.map(f64::from);
+            let [_, now, before, earlier] = sums.0;
+            let [_, value, last, second] = nodes[point].0;
             let terms = [now - before, now - last, last - second, before - earlier];
-            for row in 0..4 {
-                for column in 0..4 {
-                    matrix[row][column] += terms[row] * terms[column];
-                }
-                right[row] += terms[row] * (value - last);
-            }
+            let change = value - last;
+            let off = change.abs().min((change - terms[0]).abs()).min((change - terms[1]).abs());
+            samples.push((terms, change, off));
         }
         if several.len() < BLOCK {
             break;
         }
     }
+    let mut fitted = [0.0; 4];
+    for _ in 0..ROUNDS {
+        let (mut matrix, mut right) = ([Lanes::ZERO; 4], Lanes::ZERO);
+        for (terms, change, off) in &samples {
+            let terms = Lanes(terms.map(f64::from));
+            let weighted = Lanes::all(f64::from(1.0 / (step + off))) * terms;
+            for (row, term) in matrix.iter_mut().zip(terms.0) {
+                *row += Lanes::all(term) * weighted;
+            }
+            right += Lanes::all(f64::from(*change)) * weighted;
+        }
+        fitted = solve(matrix.map(|row| row.0), right.0);
+        #[expect(clippy::cast_possible_truncation, reason = "to weigh points by")]
+        let by = fitted.map(|part| part as f32);
+        for (terms, change, off) in &mut samples {
+            let [a, b, c, d] = *terms;
+            *off = (a * by[0] + b * by[1] + (c * by[2] + d * by[3]) - *change).abs();
+        }
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "it saturates, and NaN becomes zero")]
+    fitted.map(|part| (part * f64::from(PARTS)).round_ties_even() as i8)
+}
+
+/// Solves a system whose matrix is symmetric and as good as positive definite.
+#[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
+fn solve(mut matrix: [[f64; 4]; 4], mut right: [f64; 4]) -> [f64; 4] {
     let trace: f64 = (0..4).map(|index| matrix[index][index]).sum();
     for (index, row) in matrix.iter_mut().enumerate() {
         row[index] += 1e-9 * trace + 1e-300;
@@ -208,6 +237,5 @@ fn fit(nodes: &[Node], stencils: &[Stencil], mask: Option<&[bool]>) -> [i8; 4] {
         }
         right[row] /= matrix[row][row];
     }
-    #[expect(clippy::cast_possible_truncation, reason = "it saturates, and NaN becomes zero")]
-    right.map(|part| (part * f64::from(PARTS)).round_ties_even() as i8)
+    right
 }
