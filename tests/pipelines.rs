@@ -133,11 +133,11 @@ fn the_pictures_for_a_paper_are_drawn() {
         .map(|file| project().join(file).display().to_string());
     let arguments = ["--case", &files[0], "--pipelines", &files[1], "--out", &out];
     let (status, text) =
-        Run::flow(&[&arguments[..], &["--headless", "--steps", "60"]].concat()).finish(PATIENCE);
+        Run::flow(&[&arguments[..], &["--headless", "--steps", "61"]].concat()).finish(PATIENCE);
     assert!(status.success(), "{text}");
     for (drawn, shown) in
         [("arrows", "nozzle.png"), ("cut", "nozzle-cut.png"), ("wall", "nozzle-wall.png")]
     {
-        std::fs::copy(folder.path().join(format!("{drawn}.png")), gallery(shown)).expect("drawn");
+        std::fs::copy(folder.path().join(format!("{drawn}-000060.png")), gallery(shown)).expect("drawn");
     }
 }

@@ -1,5 +1,6 @@
 //! The three calls.
 
+mod absence;
 mod changing;
 mod checkpointing;
 mod commands;
@@ -15,6 +16,7 @@ mod tagged;
 mod tests;
 mod timing;
 mod waiting;
+mod watching;
 
 pub use stopper::Stopper;
 
@@ -322,6 +324,7 @@ impl Adaptor {
         self.saved = None;
         let moved = match met {
             Some((called, outside)) => {
+                self.notice_viewers(outside);
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;
                 if self.pipelines.listens() {
@@ -423,11 +426,7 @@ impl Adaptor {
         entered: Instant,
     ) -> Result<Option<(bool, Outside)>, ExecuteError> {
         let called = self.is_called(moment);
-        let mut outside = Outside::default();
-        if self.pipelines.listens() {
-            outside.seconds = entered.duration_since(self.timing.begun).as_secs_f64();
-            outside.viewers = self.hub.as_ref().map_or(0, |hub| hub.arrivals());
-        }
+        let outside = self.outside(entered);
         if self.communicator.size() == 1 {
             return fault.map_or(Ok(Some((called, outside))), Err);
         }
@@ -504,15 +503,9 @@ impl Adaptor {
         }
         let mut commands = Vec::new();
         if self.pipelines.is_due(moment) {
-            let begun = Instant::now();
-            let parameters = self.parameters.all();
-            let asked = self.pipelines.run(moment, channels, parameters, self.hub.as_ref());
-            self.timing.pipelines.add(begun.elapsed());
-            for fault in asked.faults {
-                self.complain(&fault);
-            }
+            let asked = self.run_pipelines(moment, channels);
             // A replay has the commands from the journal.
-            commands = if self.is_replay { Vec::new() } else { asked.commands };
+            commands = if self.is_replay { Vec::new() } else { asked };
         }
         self.obey_again(moment, false);
         for (pipeline, command) in commands {

@@ -50,24 +50,26 @@ pub(crate) fn meet(
     Ok(unpacked(called))
 }
 
-/// Bits of the count of viewers, behind one bit for the call; the milliseconds have the others.
+/// Bits of the count of viewers, behind one bit for the call and one that says whether anybody watches;
+/// the milliseconds have the others.
 const VIEWERS: u32 = 20;
 
-fn packed(called: bool, Outside { seconds, viewers }: Outside) -> u64 {
+fn packed(called: bool, Outside { seconds, viewers, is_watched }: Outside) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a conversion that saturates"
     )]
     let milliseconds = (seconds * 1e3) as u64;
-    milliseconds << (VIEWERS + 1) | viewers.min((1 << VIEWERS) - 1) << 1 | u64::from(called)
+    let viewers = viewers.min((1 << VIEWERS) - 1);
+    milliseconds << (VIEWERS + 2) | viewers << 2 | u64::from(is_watched) << 1 | u64::from(called)
 }
 
 fn unpacked(packed: u64) -> (bool, Outside) {
-    #[expect(clippy::cast_precision_loss, reason = "milliseconds below 2^43")]
-    let seconds = (packed >> (VIEWERS + 1)) as f64 / 1e3;
-    let viewers = packed >> 1 & ((1 << VIEWERS) - 1);
-    (packed & 1 == 1, Outside { seconds, viewers })
+    #[expect(clippy::cast_precision_loss, reason = "milliseconds below 2^42")]
+    let seconds = (packed >> (VIEWERS + 2)) as f64 / 1e3;
+    let viewers = packed >> 2 & ((1 << VIEWERS) - 1);
+    (packed & 1 == 1, Outside { seconds, viewers, is_watched: packed & 2 == 2 })
 }
 
 const SIGN: u64 = 1 << 63;
@@ -142,10 +144,11 @@ mod tests {
         let at = |cycle: u64| Moment { cycle, time: 0.0 };
         let met = threads::run(3, |ranks| {
             let own = ranks.rank() as f64;
-            let outside = Outside { seconds: 12.5 + own, viewers: 3 };
+            let is_watched = ranks.rank() == 0;
+            let outside = Outside { seconds: 12.5 + own, viewers: 3, is_watched };
             meet(&ranks, at(4), None, ranks.rank() == 0, outside)
         });
-        let of_first = (true, Outside { seconds: 12.5, viewers: 3 });
+        let of_first = (true, Outside { seconds: 12.5, viewers: 3, is_watched: true });
         assert!(met.into_iter().all(|met| met.is_ok_and(|met| met == of_first)));
         let said = threads::run(3, |ranks| {
             let fault = (ranks.rank() > 0).then_some(ExecuteError::NoChannel { cycle: 4 });

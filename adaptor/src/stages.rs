@@ -262,6 +262,18 @@ impl Pipelines {
     /// Tells what goes on outside, alike on all ranks: it counts from the next step on.
     pub(crate) fn tell(&mut self, outside: Outside) {
         self.runner.tell(outside.seconds, outside.viewers);
+        self.runner.set_watched(outside.is_watched);
+    }
+
+    /// Says whether anybody looks at what is shown, alike on all ranks.
+    pub(crate) fn set_watched(&mut self, is_watched: bool) {
+        self.runner.set_watched(is_watched);
+    }
+
+    /// Whether anybody looks at what is shown, as was said last.
+    #[inline]
+    pub(crate) fn is_watched(&self) -> bool {
+        self.runner.is_watched()
     }
 
     /// Says that pipelines could run last at this cycle, where they cannot at every step.

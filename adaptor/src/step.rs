@@ -26,6 +26,8 @@ pub(crate) struct Outside {
     pub(crate) seconds: f64,
     /// How many viewers have come so far.
     pub(crate) viewers: u64,
+    /// Whether anybody looks at what is shown, a recording too.
+    pub(crate) is_watched: bool,
 }
 
 /// A cycle and its simulated time.

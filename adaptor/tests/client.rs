@@ -324,6 +324,21 @@ fn a_command_that_the_network_swallows_is_sent_again() {
 }
 
 #[test]
+fn silence_is_no_refusal_of_the_wheel() {
+    let run = Run::new(LINK_TO_ALL);
+    let proxy = Proxy::to(run.address);
+    let client = Client::connect(&run.over(proxy.port), &quick()).expect("connected");
+    proxy.swallow(true);
+    let silent = client.drive(Duration::from_millis(300));
+    assert!(matches!(silent, Err(ClientError::NoAnswer { .. })), "{silent:?}");
+    proxy.drop_all();
+    proxy.swallow(false);
+    client.drive(PATIENCE).expect("the wheel, once the connection is there again");
+    drop(client);
+    run.end();
+}
+
+#[test]
 fn a_closed_client_has_let_go_of_the_wheel_while_it_is_still_there() {
     let run = Run::new(MONITORED);
     let first = Client::connect(&run.link, &Options::default()).expect("connected");

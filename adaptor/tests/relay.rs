@@ -245,6 +245,17 @@ fn behind_the_relay_a_run_asks_for_its_own_secret() {
     let error = connect(&wrong.parse().expect("a link")).err().expect("refused");
     assert!(matches!(error, ClientError::WrongToken { .. }), "{error}");
     assert_eq!(request(here.relay.address(), "POST", "/nozzle/stack", &[]).status, 405);
+    // A `HEAD` is answered as the run does: with what a `GET` says, and no more.
+    let of_driver = bearer(&of_run);
+    for (path, status) in [("/nozzle/stack", 200), ("/nozzle/other", 404), ("/other/", 404)] {
+        let [got, asked] = ["GET", "HEAD"].map(|method| {
+            request(here.relay.address(), method, path, &[("Authorization", &of_driver)])
+        });
+        assert_eq!((got.status, asked.status), (status, status), "{path} {asked:?}");
+        let length = asked.header("content-length");
+        assert!(length.is_some() && length == got.header("content-length"), "{asked:?}");
+        assert!(!got.body.is_empty() && asked.body.is_empty(), "{asked:?}");
+    }
 }
 
 #[test]

@@ -172,6 +172,40 @@ fn an_order_waits_no_longer_than_it_says_itself() {
     solver.finish();
 }
 
+/// An order that waits says behind which, also once that one is gone.
+#[test]
+fn what_waited_behind_an_order_that_is_gone_says_what_it_waits_for_now() {
+    let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    let (mut solver, mut viewer) = beside_a_long_plan(settings);
+    for id in ["a", "b", "c"] {
+        let mut order = squeeze(0.1);
+        if id == "b" {
+            order["deadline"] = json!(1);
+        }
+        viewer.send(&json!({"id": id, "order": order}));
+    }
+    let waits = |viewer: &mut Viewer, solver: &mut Solver, id: &str, before: &str| {
+        let expected = format!("order {before}, which came before it");
+        solver.step_until_told(viewer, "order", |order| {
+            order["id"] == id && order["waits_for"] == *expected
+        });
+    };
+    waits(&mut viewer, &mut solver, "a", "long");
+    waits(&mut viewer, &mut solver, "b", "a");
+    waits(&mut viewer, &mut solver, "c", "b");
+    viewer.send(&json!({"cancel": {"order": "a"}}));
+    waits(&mut viewer, &mut solver, "b", "long");
+    // It waits for too long.
+    waits(&mut viewer, &mut solver, "c", "long");
+    viewer.send(&json!({"id": "d", "order": squeeze(0.1)}));
+    waits(&mut viewer, &mut solver, "d", "c");
+    let mut order = squeeze(0.2);
+    order["replaces"] = json!("c");
+    viewer.send(&json!({"id": "e", "order": order}));
+    waits(&mut viewer, &mut solver, "d", "e");
+    solver.finish();
+}
+
 #[test]
 fn an_order_waits_no_longer_in_a_paused_run() {
     let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };

@@ -104,6 +104,8 @@ pub const PENDING: Limit =
 /// Bytes of the commands of viewers that wait.
 pub const PENDING_BYTES: Limit =
     limit("bytes that wait", 64 << 20, "the commands of viewers whose turn has not come");
+/// Pages that may show the viewer: as many as one header has room for.
+pub const EMBEDDERS: Limit = limit("pages", 16, "those that may show the viewer inside of them");
 /// Notes that are pinned in a run.
 pub const NOTES: Limit = limit("notes", 200, "a run: those that are pinned in its picture");
 /// Characters of a note.
@@ -151,7 +153,7 @@ pub const ERRORS: Limit =
     limit("errors", 100, "what is told of one text; of more errors only their number");
 
 /// All of them.
-pub const ALL: [Limit; 35] = [
+pub const ALL: [Limit; 36] = [
     DOCUMENT,
     VALUES,
     DEPTH,
@@ -171,6 +173,7 @@ pub const ALL: [Limit; 35] = [
     WAITING_BYTES,
     PENDING,
     PENDING_BYTES,
+    EMBEDDERS,
     NOTES,
     NOTE,
     VIEWER_NAME,

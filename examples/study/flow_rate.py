@@ -17,7 +17,7 @@ import study
 from throat import throat
 
 # A flow that pressure drives settles slowly: what flows has to be speeded up first.
-SCHEDULE, CRITERION = 5, study.Criterion(window=20, change=3e-4)
+SCHEDULE, CRITERION = 5, study.Criterion(window=20, change=1e-3)
 
 
 def search(part: float, tolerance: float) -> study.Search:
@@ -33,7 +33,7 @@ def search(part: float, tolerance: float) -> study.Search:
 def main() -> int:
     """The program."""
     case = "examples/flow/cases/nozzle-pressure.json"
-    parser = study.arguments(__doc__.splitlines()[0], case, 1e-3, SCHEDULE, CRITERION)
+    parser = study.arguments(__doc__.splitlines()[0], case, 2e-3, SCHEDULE, CRITERION)
     parser.add_argument("--part", type=float, default=0.8, help="the wanted flow rate, in parts of the reference's")
     given = parser.parse_args()
     flows = study.flows(given, study.RATE)

@@ -206,6 +206,46 @@ fn a_budget_thins_the_cadence_alike_on_all_ranks() {
     assert_eq!(last, [4; 20]);
 }
 
+/// A view rests while nobody looks, on all ranks; what measures, and what comes once, does not.
+#[test]
+fn views_rest_while_nobody_looks() {
+    let pipelines = r#"
+        {"name": "view", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
+        {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}, {"stream": {}}]},
+        {"name": "once", "at": {"cycle": 7}, "stages": [{"surface": {}}, {"stream": {}}]}"#;
+    let made = threads::run(3, |ranks| {
+        let rank = ranks.rank();
+        // A run takes 45 milliseconds on the clock of rank 0, and none by those of the others.
+        let ticks = AtomicU64::new(0);
+        let clock = move || {
+            let own = if rank == 0 { 45 } else { 0 };
+            ticks.fetch_add(own, Ordering::Relaxed) as f64 * 1e-3
+        };
+        let runner = Runner::with_communicator(&config(pipelines), Arc::new(ranks)).unwrap();
+        let mut runner = runner.with_clock(clock);
+        assert!(runner.listens());
+        let ran_at = |cycle: u64| {
+            runner.tell(10.0 * cycle as f64, 0);
+            runner.set_watched(!(4..19).contains(&cycle));
+            let before: Vec<u64> = runner.costs().map(|(_, cost)| cost.runs).collect();
+            step_of(rank, &mut runner, cycle, 0.0);
+            let ran = runner.costs().zip(before).filter(|((_, cost), runs)| cost.runs > *runs);
+            ran.map(|((name, _), _)| (name.to_owned(), cycle)).collect::<Vec<_>>()
+        };
+        (0..26).flat_map(ran_at).collect::<Vec<_>>()
+    });
+    let of = |ran: &[(String, u64)], name: &str| -> Vec<u64> {
+        ran.iter().filter(|(of, _)| of == name).map(|(_, cycle)| *cycle).collect()
+    };
+    for ran in made {
+        // It is taken when the last viewer has left, then no more often than a thousandth of the time
+        // allows, and at once when somebody comes.
+        assert_eq!(of(&ran, "view"), [0, 2, 4, 10, 16, 19, 20, 22, 24]);
+        assert_eq!(of(&ran, "health"), (0..26).step_by(2).collect::<Vec<_>>());
+        assert_eq!(of(&ran, "once"), [7]);
+    }
+}
+
 #[test]
 fn what_means_nothing_is_refused_with_its_place() {
     let p = r#"{"name": "p", "stages": [{"statistics": {"field": "p"}}]}"#;

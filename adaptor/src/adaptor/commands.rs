@@ -2,8 +2,8 @@
 
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, OnceLock},
-    time::{Duration, Instant},
+    sync::{Arc, OnceLock},
+    time::Duration,
 };
 
 use serde_json::{Value, json};
@@ -14,10 +14,9 @@ use tombolo_pipelines::{
     language::{Command, JournalNote, Message, Order, Problem, Question, locate},
 };
 
-use super::{Adaptor, SteeredMesh};
+use super::{Adaptor, SteeredMesh, absence::Absence};
 use crate::{
     changes::{Changes, make_absolute},
-    lock::lock,
     meeting,
     steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source, taken_back},
     step::Moment,
@@ -274,8 +273,11 @@ impl Adaptor {
 
     /// Takes an order back that has not begun to move the mesh.
     fn cancel(&mut self, order: &str, source: &Source, moment: Moment) -> Result<(), String> {
-        self.withdraw(order)?;
+        let index = self.withdraw(order)?;
         self.log.cancel(order, moment, format!("cancelled{}", by(source)));
+        if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
+            steerer.say_why(index);
+        }
         Ok(())
     }
 
@@ -351,36 +353,37 @@ pub(super) struct Intake {
     pub(super) is_in_parts: bool,
     /// Whether the run is carried out as a journal says.
     pub(super) is_replay: bool,
-    /// How long a paused run waits for somebody who could resume it; without end if `None`.
-    pub(super) resume_after: Option<Duration>,
-    /// Since when it is paused and there is nobody who could.
-    pub(super) abandoned: Mutex<Option<Instant>>,
+    /// How long the run waits for people who are gone.
+    pub(super) absence: Absence,
 }
 
 impl Intake {
-    /// Resumes a paused run that nobody can resume any more, where that is wanted.
-    fn look_for_drivers(&self) {
-        let Some(patience) = self.resume_after else { return };
-        let mut abandoned = lock(&self.abandoned);
-        if !self.hub.is_paused_alone() {
-            *abandoned = None;
-            return;
+    /// Has the run do what is wanted where people have been gone for long enough.
+    fn look_for_people(&self) {
+        if let Some(patience) = self.absence.of_drivers(&self.hub) {
+            let why = "it was paused and nobody was there who could resume it";
+            self.give(Command::Resume {}, "goes on", why, patience);
         }
-        if abandoned.get_or_insert_with(Instant::now).elapsed() < patience {
-            return;
+        if let Some((patience, command)) = self.absence.of_viewers(&self.hub) {
+            let what = match command {
+                Command::Stop {} => "is stopped",
+                _ => "is paused",
+            };
+            self.give(command, what, "nobody has watched it", patience);
         }
-        *abandoned = None;
-        drop(abandoned);
-        let (source, command) = (Source::Program, Command::Resume {});
+    }
+
+    /// Gives a command that nobody has asked for.
+    fn give(&self, command: Command, what: &str, why: &str, patience: Duration) {
+        let source = Source::Program;
         // It has no name of its own that could be taken.
-        if let Ok(id) = self.log.accept(None, &source, &command, self.hub.clock.get()) {
-            let run = self.log.run();
-            tracing::warn!(
-                run,
-                "the run was paused and nobody was there who could resume it for {} seconds: it goes on",
-                patience.as_secs()
-            );
-            self.queue.push(Received { source, id, command, reservation: None });
+        let Ok(id) = self.log.accept(None, &source, &command, self.hub.clock.get()) else { return };
+        let (run, seconds) = (self.log.run(), patience.as_secs());
+        tracing::warn!(run, "the run {what}: {why} for {seconds} seconds");
+        let stops = matches!(command, Command::Stop {});
+        self.queue.push(Received { source, id, command, reservation: None });
+        if stops {
+            self.forecaster.get().into_iter().for_each(Forecaster::give_up);
         }
     }
 
@@ -480,7 +483,7 @@ impl CommandSink for Intake {
 
     fn look_at_time(&self) {
         self.log.look_at_time();
-        self.look_for_drivers();
+        self.look_for_people();
     }
 
     fn driven(&self) {

@@ -2,8 +2,8 @@
 
 use std::{
     path::Path,
-    sync::{Arc, Mutex, atomic::AtomicBool},
-    time::{Duration, SystemTime},
+    sync::{Arc, atomic::AtomicBool},
+    time::SystemTime,
 };
 
 use serde_json::json;
@@ -13,6 +13,7 @@ use tombolo_pipelines::language::{
 
 use super::{
     Adaptor, Meetings, SteeredMesh,
+    absence::Absence,
     checkpointing::{Given, hash_of},
     commands::Intake,
     contract::Lent,
@@ -134,11 +135,7 @@ impl Adaptor {
                     changes: Arc::clone(&changes),
                     is_in_parts: communicator.size() > 1,
                     is_replay,
-                    resume_after: config
-                        .steering
-                        .resume_after
-                        .map(|seconds| Duration::from_secs(seconds.get().into())),
-                    abandoned: Mutex::default(),
+                    absence: Absence::new(&config.steering, is_replay),
                 };
                 Some(Server::start(stream, Arc::clone(hub), Arc::new(intake))?)
             }

@@ -56,6 +56,7 @@ impl Adaptor {
         if !self.paused {
             return;
         }
+        self.show_before_waiting(moment, channels);
         let begun = Instant::now();
         while self.paused && !self.stopped {
             if self.communicator.rank() == 0 {

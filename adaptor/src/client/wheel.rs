@@ -19,7 +19,8 @@ impl Client {
     /// where the last driver's connection was lost.
     ///
     /// # Errors
-    /// [`ClientError::NotDriver`] where somebody else drives, or after `patience`.
+    /// [`ClientError::NotDriver`] where it is refused and will be, or still is after `patience`;
+    /// [`ClientError::NoAnswer`] where nothing was said by then, as while a lost connection is made again.
     pub fn drive(&self, patience: Duration) -> Result<(), ClientError> {
         let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
         let hello = self.hello();
@@ -54,13 +55,14 @@ impl Client {
             if answered?.unwrap_or(Ok(false))? {
                 return Ok(());
             }
-            let reason = match answer {
-                Some(Event::Error(error)) => error.message,
-                _ => "nothing was said".into(),
-            };
-            let kept = may_drive && self.status().is_none_or(|status| status.driver.is_none());
-            if !kept || Instant::now() >= until {
-                return Err(ClientError::NotDriver { reason });
+            let is_late = Instant::now() >= until;
+            if let Some(Event::Error(error)) = answer {
+                let kept = may_drive && self.status().is_none_or(|status| status.driver.is_none());
+                if !kept || is_late {
+                    return Err(ClientError::NotDriver { reason: error.message });
+                }
+            } else if is_late {
+                return Err(no_answer("the wheel that was asked for", patience));
             }
             self.shared.wait(ASK_AGAIN, |state| state.failure.clone());
         }

@@ -19,6 +19,9 @@ const ORDERS_TOLD: usize = 100;
 /// displacement.
 const TOLD_WHOLE: usize = 16 << 10;
 
+/// What an order waits for that waits for no other.
+pub(super) const NEXT_CALL: &str = "the solver's next call";
+
 /// The commands that were given, as far as they are kept.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -141,7 +144,7 @@ impl KnownCommands {
         self.orders.push_back(OrderReport {
             id: id.to_owned(),
             cycle_accepted: cycle,
-            waits_for: Some("the solver's next call".into()),
+            waits_for: Some(NEXT_CALL.into()),
             ..OrderReport::default()
         });
     }

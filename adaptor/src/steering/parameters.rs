@@ -31,6 +31,18 @@ pub enum ParameterError {
         /// All names.
         known: Vec<String>,
     },
+    /// Bounds that are no numbers, or leave nothing between them.
+    #[error("parameter '{name}' has the bounds {} and {}; expected two finite numbers, the least first",
+        Number(*minimum), Number(*maximum)
+    )]
+    Bounds {
+        /// The name.
+        name: String,
+        /// The least that was given.
+        minimum: f64,
+        /// The greatest.
+        maximum: f64,
+    },
     /// A value out of its bounds, or none at all.
     #[error("parameter '{name}' cannot be {}; it must be a number from {} to {}",
         Number(*value), Number(*minimum), Number(*maximum)
@@ -72,7 +84,12 @@ pub(crate) struct Parameters {
 impl Parameters {
     pub(crate) fn new(all: Vec<Parameter>) -> Result<Self, ParameterError> {
         for (index, parameter) in all.iter().enumerate() {
-            check(parameter, parameter.value)?;
+            let Parameter { ref name, value, minimum, maximum } = *parameter;
+            // JSON, by which viewers are told, has no infinity.
+            if !(minimum.is_finite() && maximum.is_finite() && minimum <= maximum) {
+                return Err(ParameterError::Bounds { name: name.clone(), minimum, maximum });
+            }
+            check(parameter, value)?;
             if all[..index].iter().any(|other| other.name == parameter.name) {
                 return Err(ParameterError::Twice { name: parameter.name.clone() });
             }
@@ -122,7 +139,6 @@ impl Parameters {
 
 fn check(parameter: &Parameter, value: f64) -> Result<(), ParameterError> {
     let Parameter { name, minimum, maximum, .. } = parameter;
-    // Written so that a NaN among the three is refused.
     if value.is_finite() && *minimum <= value && value <= *maximum {
         return Ok(());
     }
@@ -166,7 +182,16 @@ mod tests {
             "{message}"
         );
         assert!(parameters.take_changed().is_empty());
-        let bad = Parameter { name: "x".into(), value: 1.0, minimum: f64::NAN, maximum: 2.0 };
-        assert!(Parameters::new(vec![bad]).is_err());
+    }
+
+    #[test]
+    fn bounds_that_leave_nothing_between_them_are_refused_by_name() {
+        for (minimum, maximum) in
+            [(f64::NAN, 2.0), (0.0, f64::INFINITY), (f64::NEG_INFINITY, 2.0), (2.0, 0.0)]
+        {
+            let bad = Parameter { name: "x".into(), value: 1.0, minimum, maximum };
+            let message = Parameters::new(vec![bad]).unwrap_err().to_string();
+            assert!(message.contains("'x' has the bounds"), "{message}");
+        }
     }
 }

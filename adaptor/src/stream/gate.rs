@@ -161,7 +161,7 @@ impl Gate {
         let (uri, headers) = (request.uri(), request.headers());
         let visitor = self.credentials.visitor(headers).map(|holder| holder.access);
         let access = match (parameter(uri, "key"), parameter(uri, "token")) {
-            (Some(key), _) => match self.credentials.redeem(key).or(visitor) {
+            (Some(key), _) => match self.credentials.sessions.redeem(key).or(visitor) {
                 Some(access) => access,
                 None => return Some((StatusCode::UNAUTHORIZED, USED).into_response()),
             },
@@ -198,7 +198,7 @@ impl Gate {
         headers: &HeaderMap,
         access: Access,
     ) -> Option<HeaderValue> {
-        let id = self.credentials.begin(access, connection.address()).ok()?;
+        let id = self.credentials.sessions.begin(access, connection.address()).ok()?;
         let name = self.credentials.cookie_name(headers);
         let is_encrypted = match connection.way() {
             Way::Direct => self.is_encrypted,

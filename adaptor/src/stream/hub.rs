@@ -9,7 +9,7 @@ use std::{
     collections::BTreeMap,
     sync::{
         Arc, Condvar, Mutex,
-        atomic::{AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, Ordering},
     },
     time::{Duration, Instant},
 };
@@ -151,6 +151,8 @@ pub(crate) struct Hub {
     pub(crate) clock: Arc<Clock>,
     counters: Counters,
     arrivals: AtomicU64,
+    /// Whether anybody is told what happens.
+    is_watched: AtomicBool,
     /// The number of the run, where one is shown.
     run: Option<Arc<str>>,
 }
@@ -249,6 +251,17 @@ impl Hub {
     /// How many viewers have come so far.
     pub(crate) fn arrivals(&self) -> u64 {
         self.arrivals.load(Ordering::Relaxed)
+    }
+
+    /// Whether anybody looks: viewers, or a recording.
+    #[inline]
+    pub(crate) fn is_watched(&self) -> bool {
+        self.is_watched.load(Ordering::Relaxed)
+    }
+
+    /// Notes whether anybody looks, where that may have changed.
+    pub(super) fn note_audience(&self, state: &HubState) {
+        self.is_watched.store(state.has_audience(), Ordering::Relaxed);
     }
 
     /// Returns once a viewer is connected, or the run is to stop.
@@ -426,6 +439,7 @@ impl Hub {
         let (views, is_known) = (state.view_numbers(), state.is_described());
         let client = Arc::new(Client::new(id, access, back, views, Pace::default(), is_known));
         state.seat(&client, takes_wheel);
+        self.note_audience(&state);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
         drop(state);
         self.work.notify_one();
@@ -443,7 +457,7 @@ impl Hub {
     }
 
     /// Whether anybody is connected.
-    pub(super) fn has_viewers(&self) -> bool {
+    pub(crate) fn has_viewers(&self) -> bool {
         !lock(&self.state).clients.is_empty()
     }
 

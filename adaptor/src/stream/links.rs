@@ -172,7 +172,7 @@ impl Links {
     /// no random numbers.
     pub(super) fn browser_link(&self) -> Option<String> {
         let access = if self.is_of_recording { Access::Watch } else { Access::Drive };
-        let key = self.credentials.key(access, None).ok()?;
+        let key = self.credentials.sessions.key(access, None).ok()?;
         Some(self.way().link("key", key.as_str()))
     }
 

@@ -44,6 +44,7 @@ mod routes;
 mod seats;
 mod secret;
 mod session;
+mod sessions;
 mod socket;
 mod stack;
 mod status;

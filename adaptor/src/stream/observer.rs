@@ -50,6 +50,7 @@ impl Observer {
         let client =
             Arc::new(Client::new(0, Access::Watch, secret, views, Pace::exact(), is_known));
         state.observer = Some(Arc::clone(&client));
+        hub.note_audience(&state);
         drop(state);
         hub.look();
         Ok(Self { client, runtime })
@@ -93,7 +94,9 @@ impl Hub {
 
     /// Tells nothing more to the observer.
     pub(crate) fn stop_observing(&self) {
-        lock(&self.state).observer = None;
+        let mut state = lock(&self.state);
+        state.observer = None;
+        self.note_audience(&state);
     }
 
     /// The description of the run, without anything that is meant for one viewer alone.

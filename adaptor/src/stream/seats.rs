@@ -52,6 +52,10 @@ impl HubState {
         self.together.changed();
     }
 
+    fn is_paused(&self) -> bool {
+        self.conditions.get("paused") == Some(&true.into())
+    }
+
     fn take_wheel(&mut self, client: u64) {
         self.wheel.driver = Some(client);
         self.wheel.heard = Some(Instant::now());
@@ -82,6 +86,7 @@ impl Hub {
             return;
         }
         state.clients.remove(&client.id);
+        self.note_audience(&state);
         if state.wheel.driver == Some(client.id) {
             state.wheel.driver = None;
             state.wheel.lost = Some((Instant::now(), client.id));
@@ -109,8 +114,12 @@ impl Hub {
     /// Whether the run is paused and nobody is connected who could resume it.
     pub(crate) fn is_paused_alone(&self) -> bool {
         let state = lock(&self.state);
-        let is_paused = state.conditions.get("paused") == Some(&true.into());
-        is_paused && !state.clients.values().any(|client| client.access == Access::Drive)
+        state.is_paused() && !state.clients.values().any(|client| client.access == Access::Drive)
+    }
+
+    /// Whether the run is paused.
+    pub(crate) fn is_paused(&self) -> bool {
+        lock(&self.state).is_paused()
     }
 
     pub(super) fn is_driver(&self, client: u64) -> bool {

@@ -304,7 +304,7 @@ fn take(
             if access == Access::Drive {
                 may_drive()?;
             }
-            let key = credentials.key(access, Some(client.id));
+            let key = credentials.sessions.key(access, Some(client.id));
             let key = key.map_err(|error| format!("no link could be made: {error}"))?;
             seat.note(did);
             client.text(&Text::of(move || {

@@ -13,7 +13,8 @@ pub(crate) type Read<T> = Result<T, Mistake>;
 pub(crate) const MESH: &str = "a tombolo.Mesh, or a dict with 'points' and 'cells'";
 
 fn kind(given: &Given<'_>) -> String {
-    format!("a {}", given.get_type())
+    let name = given.get_type().name();
+    name.map_or_else(|_| "an object".to_owned(), |name| format!("a {name}"))
 }
 
 /// What was given, as Python writes it, or the beginning of that.

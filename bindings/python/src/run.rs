@@ -78,6 +78,19 @@ impl Call<'_, '_> {
 }
 
 impl Run {
+    /// The report of a run that has ended; a run in another thread's call has not.
+    fn outcome(&self) -> Option<String> {
+        let held = match self.state.try_lock() {
+            Ok(held) => held,
+            Err(TryLockError::Poisoned(held)) => held.into_inner(),
+            Err(TryLockError::WouldBlock) => return None,
+        };
+        match &held.stage {
+            Stage::Ended(report) => Some(report.clone()),
+            Stage::UnderWay(_) => None,
+        }
+    }
+
     fn hold(&self) -> PyResult<MutexGuard<'_, State>> {
         if std::process::id() != self.process {
             return Err(CallError::new_err(
@@ -346,8 +359,8 @@ impl Run {
     }
 
     #[getter]
-    fn ended(&self) -> PyResult<bool> {
-        Ok(matches!(self.hold()?.stage, Stage::Ended(_)))
+    fn ended(&self) -> bool {
+        self.outcome().is_some()
     }
 
     /// Tells the other ranks that the solver has failed on this one, which shows no step any more.
@@ -374,11 +387,8 @@ impl Run {
 
     /// The report of a run that has ended.
     #[getter]
-    fn report(&self) -> PyResult<Option<String>> {
-        Ok(match &self.hold()?.stage {
-            Stage::Ended(report) => Some(report.clone()),
-            Stage::UnderWay(_) => None,
-        })
+    fn report(&self) -> Option<String> {
+        self.outcome()
     }
 }
 

@@ -157,7 +157,7 @@ impl Shaper {
         text: &str,
         name: &str,
     ) -> PyResult<(Bound<'py, PyAny>, String)> {
-        let request = self.asked(text, name)?;
+        let request = py.detach(|| self.asked(text, name))?;
         let mut shaper = self.hold()?;
         let shaper = &mut *shaper;
         let plan = guarded(|| Ok(py.detach(|| shaper.plan(&request))))?;
@@ -179,7 +179,7 @@ impl Shaper {
 
     /// What edits would come to, as JSON.
     fn forecast(&self, py: Python<'_>, text: &str, name: &str) -> PyResult<String> {
-        let request = self.asked(text, name)?;
+        let request = py.detach(|| self.asked(text, name))?;
         let mut shaper = self.hold()?;
         let shaper = &mut *shaper;
         let forecast = guarded(|| Ok(py.detach(|| shaper.forecast(&request))))?;
@@ -193,7 +193,7 @@ impl Shaper {
         text: &str,
         name: &str,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let request = self.asked(text, name)?;
+        let request = py.detach(|| self.asked(text, name))?;
         let mut shaper = self.hold()?;
         let shaper = &mut *shaper;
         let moved = guarded(|| {
@@ -265,9 +265,11 @@ impl Shaper {
         self.cancellation.cancel();
     }
 
-    /// Lets work go on that comes next.
-    fn renew(&self) {
+    /// Lets work go on that comes next; an error where there is some under way, which stays cancelled.
+    fn renew(&self) -> PyResult<()> {
+        let _held = self.hold()?;
         self.cancellation.renew();
+        Ok(())
     }
 }
 

@@ -235,6 +235,9 @@ def test_a_configuration_is_a_file_a_dict_or_an_error_with_its_place(tmp_path):
         tombolo.Adaptor({"version": 1, "description": object()})
     with pytest.raises(tombolo.ConfigurationError, match="inflow"):
         tombolo.Adaptor(parameters={"inflow": (50, 0, 40)})
+    for bounds in ((0, float("inf")), (float("-inf"), 40), (40, 0)):
+        with pytest.raises(tombolo.ConfigurationError, match="'inflow' has the bounds"):
+            tombolo.Adaptor(parameters={"inflow": (10, *bounds)})
     with pytest.raises(tombolo.ConfigurationError, match=r"expected \(value, minimum, maximum\)"):
         tombolo.Adaptor(parameters={"inflow": 10})
     with pytest.raises(tombolo.ConfigurationError, match="'inlet': found 'inflwo', expected 'inflow'"):

@@ -240,6 +240,23 @@ def test_long_work_tells_how_long_and_is_given_up():
     assert shaper.displacement(SQUEEZE).shape == shaper.surface.points.shape
 
 
+def test_a_refused_call_of_another_thread_takes_no_cancellation_back():
+    points, tets = box(20)
+    shaper, refused = shaper_of(points, tets, ends(points, tets)), []
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 45}}]
+
+    def progress(elapsed):
+        if elapsed > 0.05 and not refused:
+            shaper.cancel()
+            with pytest.raises(tombolo.CallError, match="in another call"):
+                shaper.displacement(SQUEEZE)
+            refused.append(elapsed)
+
+    with pytest.raises(tombolo.RejectedError, match=r"(?i)cancel|given up"):
+        shaper.shape(turn, progress=progress)
+    assert refused
+
+
 def plate():
     """The unit square as quadrangles, in two coordinates, and its two halves."""
     axis = np.linspace(0, 1, 5)

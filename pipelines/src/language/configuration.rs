@@ -340,6 +340,21 @@ pub struct Steering {
     /// it. Left out, it stays paused.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resume_after: Option<NonZeroU32>,
+    /// What becomes of the run while no viewer is connected, since its beginning or since the last one
+    /// left. Left out, it goes on. Needs `stream`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unwatched: Option<Unwatched>,
+}
+
+/// What becomes of a run that nobody watches. A recording watches nothing, and a replay goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Unwatched {
+    /// It is paused after so many seconds, until somebody comes and resumes it. Not beside
+    /// `resume_after`, by which it would go on because nobody comes.
+    PauseAfter(NonZeroU32),
+    /// It is asked to stop after so many seconds, also where it is paused.
+    StopAfter(NonZeroU32),
 }
 
 impl Default for Steering {
@@ -350,6 +365,7 @@ impl Default for Steering {
             poll_steps: NonZeroU32::MIN,
             deadline: const { NonZeroU32::new(600).unwrap() },
             resume_after: None,
+            unwatched: None,
         }
     }
 }

@@ -67,7 +67,7 @@ pub use cameras::{Camera, Orbit, Viewpoint};
 pub use check::{Content, Trial, check, check_content, check_orders};
 pub use check_pipeline::{Beside, check_pipeline};
 pub use configuration::{
-    Config, Listen, Steering, StreamLimits, StreamServer, Tls, record_megabytes,
+    Config, Listen, Steering, StreamLimits, StreamServer, Tls, Unwatched, record_megabytes,
 };
 pub use derived::{Derived, Formula};
 pub(crate) use derived::{GIVEN, PARAMETER};

@@ -5,6 +5,7 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::relay_address::is_host;
+use crate::limits::EMBEDDERS;
 
 /// Bytes that an origin may have.
 const LENGTH: usize = 260;
@@ -90,15 +91,12 @@ impl<'de> Deserialize<'de> for PageOrigin {
     }
 }
 
-/// The pages that may show a viewer inside of them: as many as one header has room for.
+/// The pages that may show a viewer inside of them, [`EMBEDDERS`] at most.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
 pub struct Embedders(Vec<PageOrigin>);
 
 impl Embedders {
-    /// The most pages that may be named.
-    pub const MOST: usize = 16;
-
     /// Whether no page may.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -114,11 +112,7 @@ impl Embedders {
 impl<'de> Deserialize<'de> for Embedders {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let origins = Vec::<PageOrigin>::deserialize(deserializer)?;
-        if origins.len() > Self::MOST {
-            let (found, most) = (origins.len(), Self::MOST);
-            let message = format!("found {found} pages, expected {most} at most");
-            return Err(serde::de::Error::custom(message));
-        }
+        EMBEDDERS.check(origins.len()).map_err(serde::de::Error::custom)?;
         Ok(Self(origins))
     }
 }
@@ -166,8 +160,8 @@ mod tests {
             let error = text.parse::<PageOrigin>().expect_err(text);
             assert!(error.contains(reason), "{text}: {error}");
         }
-        let many = serde_json::json!(vec!["http://a"; Embedders::MOST + 1]);
+        let many = serde_json::json!(vec!["http://a"; EMBEDDERS.most + 1]);
         let error = serde_json::from_value::<Embedders>(many).expect_err("too many");
-        assert!(error.to_string().contains("found 17 pages, expected 16 at most"), "{error}");
+        assert!(error.to_string().contains("found 17 pages, expected at most 16"), "{error}");
     }
 }

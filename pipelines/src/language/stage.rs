@@ -82,7 +82,8 @@ pub enum Stage {
     /// `decimate.error`, the largest distance of a point from what is left, and
     /// `decimate.triangles`.
     Decimate(Decimate),
-    /// Sends the extract to the viewers as the view of this pipeline; of volume cells their outside.
+    /// Sends the extract to the viewers as the view of this pipeline; of volume cells their outside. While
+    /// nobody watches and nothing records, a pipeline of which nothing else comes rests.
     Stream(StreamStage),
     /// Writes the extract, or the whole mesh where no stage has extracted anything, to a file.
     Write(Write),

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use tombolo_deform::number::Number;
 
-use super::configuration::Config;
+use super::configuration::{Config, Unwatched};
 use super::derived::check_name;
 use super::error::finite;
 use super::file_pattern::check_file;
@@ -79,9 +79,21 @@ impl Config {
         let limits = self.stream.iter().flat_map(|stream| stream.limits.problems());
         limits.for_each(|problem| found.push(problem.within("limits").within("stream")));
         let no_stream = self.stream.is_none() && !unread.of_configuration;
-        if self.steering.wait_for_viewer && no_stream {
+        let needs_stream = [
+            ("wait_for_viewer", self.steering.wait_for_viewer),
+            ("unwatched", self.steering.unwatched.is_some()),
+        ];
+        for (key, _) in needs_stream.iter().filter(|(_, is_given)| *is_given && no_stream) {
             let message = "there is no `stream`, so that no viewer could connect";
-            found.push(Problem::new(message).within("wait_for_viewer").within("steering"));
+            found.push(Problem::new(message).within(key).within("steering"));
+        }
+        if let (Some(Unwatched::PauseAfter(_)), Some(_)) =
+            (self.steering.unwatched, self.steering.resume_after)
+        {
+            let message = "found `resume_after` too, by which a run that is paused because nobody \
+                           watches goes on while nobody does; expected one of them";
+            let problem = Problem::new(message).within("pause_after").within("unwatched");
+            found.push(problem.within("steering"));
         }
         for (field, unit) in &self.units {
             if unit.trim().is_empty()

@@ -16,6 +16,8 @@ pub(super) struct Now {
     pub(super) seconds: f64,
     /// How many viewers have come so far.
     pub(super) viewers: u64,
+    /// Whether nobody looks at what is shown.
+    pub(super) is_unwatched: bool,
     /// The last cycle at which pipelines could run, where they cannot at every step.
     pub(super) met: Option<u64>,
 }
@@ -52,6 +54,16 @@ impl Clock {
             Due::OnViewer => now.viewers > self.viewers,
             Due::OnOrder | Due::OnEnd => false,
         }
+    }
+
+    /// Whether one of its times has come or gone by since it last ran.
+    #[inline]
+    pub(super) fn has_struck(&self, now: &Now) -> bool {
+        let met = match (now.met, self.last_cycle) {
+            (Some(met), Some(last)) => Some(met.min(last)),
+            (met, last) => met.or(last),
+        };
+        self.is_due(&Now { met, ..*now })
     }
 
     /// Whether it waits for what is not in the step itself.
@@ -106,7 +118,8 @@ mod tests {
         for cycle in 0..steps {
             // Each step takes 0.3 seconds, and viewers come before the fifth and the sixth.
             let seconds = 0.3 * cycle as f64;
-            let now = Now { cycle, time, seconds, viewers: cycle.clamp(3, 5) - 3, met: None };
+            let now =
+                Now { cycle, time, seconds, viewers: cycle.clamp(3, 5) - 3, ..Now::default() };
             if clock.is_due(&now) {
                 clock.take(&now);
                 taken.push(cycle);

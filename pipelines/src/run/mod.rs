@@ -8,6 +8,7 @@ mod mesh_trial;
 mod output;
 mod pipeline;
 mod replace;
+mod rest;
 mod saved;
 mod trigger;
 
@@ -111,6 +112,20 @@ impl Runner {
         (self.outside.seconds, self.outside.viewers) = (seconds, viewers);
     }
 
+    /// Says whether anybody looks at what is shown; at first somebody does. While nobody does, a
+    /// pipeline of which nothing comes but a view runs so seldom that it takes no more than a
+    /// thousandth of the time. Once somebody does it runs at the next step, where one of its times has
+    /// gone by. All ranks say the same, and [`tell`](Self::tell) the seconds.
+    pub fn set_watched(&mut self, is_watched: bool) {
+        self.outside.is_unwatched = !is_watched;
+    }
+
+    /// Whether anybody looks at what is shown, as was said last.
+    #[must_use]
+    pub fn is_watched(&self) -> bool {
+        !self.outside.is_unwatched
+    }
+
     /// Says that pipelines could run last at this cycle, for ranks that do not come together at
     /// every step: those of every so many steps make up for a multiple that went by since. All
     /// ranks say the same.
@@ -118,10 +133,11 @@ impl Runner {
         self.outside.met = Some(cycle);
     }
 
-    /// Whether any pipeline waits for what [`tell`](Self::tell) tells.
+    /// Whether any pipeline waits for what [`tell`](Self::tell) tells, or heeds whether it is watched.
     #[must_use]
     pub fn listens(&self) -> bool {
-        self.pipelines.iter().any(|prepared| prepared.due.listens())
+        let listens = |it: &Prepared| it.due.listens() || it.rest.only_shows();
+        self.pipelines.iter().any(listens)
     }
 
     /// Tells the values of the solver's parameters, which conditions may name.
@@ -170,7 +186,7 @@ impl Runner {
     #[inline]
     pub fn is_due(&self, cycle: u64, time: f64) -> bool {
         let now = Now { cycle, time, ..self.outside };
-        self.pipelines.iter().any(|prepared| prepared.is_chosen && prepared.due.is_due(&now))
+        self.pipelines.iter().any(|prepared| prepared.is_due(&now))
     }
 
     /// Whether any pipeline that is due at this step looks at the channel of this name; `is_first`
@@ -179,8 +195,7 @@ impl Runner {
     pub fn reads(&self, cycle: u64, time: f64, channel: &str, is_first: bool) -> bool {
         let reads = |name: Option<&str>| name.map_or(is_first, |name| name == channel);
         let now = Now { cycle, time, ..self.outside };
-        let is_due = |prepared: &&Prepared| prepared.is_chosen && prepared.due.is_due(&now);
-        let due = self.pipelines.iter().filter(is_due);
+        let due = self.pipelines.iter().filter(|prepared| prepared.is_due(&now));
         due.map(|prepared| prepared.pipeline.channel.as_deref()).any(reads)
     }
 
@@ -200,7 +215,7 @@ impl Runner {
         let mut outputs = Vec::new();
         let now = Now { cycle: snapshot.cycle, time: snapshot.time, ..self.outside };
         for prepared in &mut self.pipelines {
-            if !prepared.is_chosen || !prepared.due.is_due(&now) {
+            if !prepared.is_due(&now) {
                 continue;
             }
             prepared.due.take(&now);
@@ -231,7 +246,7 @@ impl Runner {
                 history.push(Measured { cycle: now.cycle, time: now.time, values: measured });
             }
             let ended = (self.clock)();
-            let message = prepared.ran(begun, ended, &*self.communicator);
+            let message = prepared.ran(&now, begun, ended, &*self.communicator);
             if let Some(message) = message.filter(|_| self.communicator.rank() == 0) {
                 let pipeline = Arc::clone(&prepared.name);
                 outputs.push(Output::Error { pipeline, cycle: now.cycle, message });

@@ -1,6 +1,7 @@
 //! The shape of one mesh and the orders that change it.
 
 mod handing;
+mod planning;
 mod recorded;
 mod saved;
 #[cfg(test)]
@@ -10,28 +11,27 @@ mod waiting;
 use std::{
     collections::VecDeque,
     sync::{Arc, Mutex},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use tombolo_deform::{
     mesh::{Domain, Mesh, Vector},
-    quality::{Quality, quality},
+    quality::quality,
     shape::{CurrentShape, Forecast, Plan, Shaper},
     surface::Surface,
 };
 use tombolo_pipelines::language::{HandedShape, Order};
 
 use super::{
-    Defaults, EditStack, Forecaster, Log, MeshMotion, OrderStatus, Queue, Reservation,
-    SurfaceMotion,
+    Defaults, EditStack, Forecaster, Log, MeshMotion, Queue, Reservation, SurfaceMotion,
     forecaster::{Planning, Present},
     lent::{Own, Rounding},
     planner::{PlanRequest, Planner, Rejection},
     stack::StackError,
     together::PlanTogether,
-    worker::{Done, Worker},
+    worker::Worker,
 };
-use crate::{lock::lock, step::Moment};
+use crate::lock::lock;
 use handing::{Motion, Pending};
 use recorded::Recorded;
 pub(crate) use saved::SavedSteering;
@@ -42,6 +42,8 @@ struct Task {
     order: Order,
     background: bool,
     reservation: Option<Reservation>,
+    /// The order that it waits for, as was told last.
+    behind: Option<String>,
 }
 
 /// An order whose plan is being made.
@@ -68,7 +70,7 @@ impl Computing {
     /// The order, to be planned anew.
     fn into_task(self) -> Task {
         let Self { id, order, background, reservation, .. } = self;
-        Task { id, order, background, reservation }
+        Task { id, order, background, reservation, behind: None }
     }
 }
 
@@ -340,248 +342,5 @@ impl Steerer {
         // nothing is known.
         let reference = self.reference_quality.filter(|_| !self.here.surface_only);
         self.quality.map(|(min, mean)| (min, mean, 0)).or(reference)
-    }
-
-    /// Puts an order into the queue, with the room that it takes there: at the end, or where a
-    /// withdrawn one was.
-    pub(crate) fn take(
-        &mut self,
-        id: String,
-        order: Order,
-        background: bool,
-        reservation: Option<Reservation>,
-        index: Option<usize>,
-    ) {
-        let background = background && self.worker.is_some();
-        let index = index.unwrap_or(self.waiting.len()).min(self.waiting.len());
-        self.waiting.insert(index, Task { id, order, background, reservation });
-        self.say_why(index);
-        self.say_why(index + 1);
-    }
-
-    /// Says what an order of the queue waits for, where it is another order.
-    fn say_why(&self, index: usize) {
-        let Some(task) = self.waiting.get(index) else { return };
-        let before = match index.checked_sub(1).and_then(|index| self.waiting.get(index)) {
-            Some(before) => Some(&before.id),
-            None => self.computing.as_ref().map(|computing| &computing.id),
-        };
-        if let Some(before) = before {
-            let reason = format!("order {before}, which came before it");
-            self.log.update(&task.id, |order| order.waits_for = Some(reason));
-        }
-    }
-
-    /// Takes an order out of the queue, or one that does not move the mesh yet, and returns its place
-    /// in the queue; the error says that it moves the mesh already. `None` where it is neither.
-    pub(crate) fn withdraw(&mut self, id: &str) -> Option<Result<usize, String>> {
-        if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
-            self.waiting.remove(index);
-            return Some(Ok(index));
-        }
-        if let Some(computing) = self.computing.take_if(|computing| computing.id == id) {
-            if let Some(worker) = &self.worker {
-                worker.cancel(computing.number);
-            }
-            return Some(Ok(0));
-        }
-        let motion = self.motion.as_ref().filter(|motion| motion.id == id)?;
-        Some(Err(format!(
-            "order '{id}' moves the mesh already (shape {} of {}), so that it cannot be taken back; an order {{\"undo\": 1}} goes back",
-            motion.taken,
-            motion.plan.shapes()
-        )))
-    }
-
-    /// Brings orders as far as they can come now; says whether anything changed. Called at safe
-    /// points only. On several ranks an order whose plan is given up waits again, in its place, and
-    /// so do those behind it: the next call brings what it was given up for.
-    pub(crate) fn advance(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
-        let mut changed = false;
-        loop {
-            changed |= self.collect(moment, step_seconds);
-            if let Some(computing) = &self.computing {
-                if self.paused {
-                    return changed;
-                }
-                if computing.planned.is_some() {
-                    self.begin_planned(moment, step_seconds);
-                    changed = true;
-                    continue;
-                }
-                // An order that must take effect at this cycle waits for the one before it.
-                if self.waiting.iter().all(|task| task.background) {
-                    return changed;
-                }
-                let done = self.worker.as_ref().map(Worker::take);
-                if let Some(done) = done {
-                    self.finish(done, moment, step_seconds);
-                }
-                changed = true;
-                continue;
-            }
-            let Some(task) = self.waiting.pop_front() else { return changed };
-            changed = true;
-            if let Some(given_up) = self.start(task, moment, step_seconds) {
-                self.waiting.push_front(given_up);
-                return changed;
-            }
-        }
-    }
-
-    /// Takes what the worker has finished.
-    fn collect(&mut self, moment: Moment, step_seconds: Option<f64>) -> bool {
-        let mut changed = false;
-        while let Some(done) = self.worker.as_ref().and_then(Worker::try_take) {
-            self.finish(done, moment, step_seconds);
-            changed = true;
-        }
-        changed
-    }
-
-    /// Has the shapes of an order found; of one that the ranks gave up meanwhile, the order.
-    fn start(&mut self, task: Task, moment: Moment, step_seconds: Option<f64>) -> Option<Task> {
-        let Task { id, order, background, reservation } = task;
-        let (stack, asked) = match self.asked(&order) {
-            Ok(asked) => asked,
-            Err(error) => {
-                self.log.reject(&id, moment, &error.into());
-                return None;
-            }
-        };
-        self.log.update(&id, |order| {
-            order.status = OrderStatus::Computing;
-            order.waits_for = None;
-        });
-        let defaults = self.defaults.clone();
-        let mut computing = Computing {
-            id,
-            number: 0,
-            order,
-            defaults,
-            stack,
-            asked,
-            resting: false,
-            planned: None,
-            background,
-            reservation,
-        };
-        match &mut self.worker {
-            Some(worker) if background => {
-                computing.number = worker.plan(computing.asked.clone());
-                self.computing = Some(computing);
-            }
-            worker => {
-                let begun = Instant::now();
-                let plan = match (worker, &self.together) {
-                    (Some(worker), _) => worker.plan_here(&self.planner, &computing.asked),
-                    (None, None) => lock(&self.planner).plan(&computing.asked),
-                    (None, Some(together)) => {
-                        // What a run has done before, nobody takes back.
-                        let recorded = self.recorded.as_ref();
-                        let is_repeated = recorded.is_some_and(|it| it.repeats(moment.cycle));
-                        let id = (!is_repeated).then_some(&*computing.id);
-                        let plan = || lock(&self.planner).plan(&computing.asked);
-                        let plan = together.run(id, plan);
-                        if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
-                            return Some(computing.into_task());
-                        }
-                        plan
-                    }
-                };
-                self.take_plan(computing, plan, moment, begun, step_seconds);
-            }
-        }
-        None
-    }
-
-    fn finish(&mut self, done: Done, moment: Moment, step_seconds: Option<f64>) {
-        match done {
-            Done::Prepared(quality) => {
-                let Quality { min, mean, inverted, .. } = *quality;
-                self.reference_quality = Some((min, mean, inverted));
-            }
-            Done::Gone => {
-                self.worker = None;
-                if let Some(computing) = self.computing.take_if(|asked| asked.planned.is_none()) {
-                    let gone = Rejection::from("the thread that plans shapes has ended");
-                    self.log.reject(&computing.id, moment, &gone);
-                }
-            }
-            Done::Planned(number, plan) => {
-                // One that was cancelled counts no more.
-                let Some(computing) = self.computing.take_if(|asked| asked.number == number) else {
-                    return;
-                };
-                let is_stale = (*plan).as_ref().is_ok_and(|plan| !self.is_of_now(plan))
-                    || computing.defaults != self.defaults;
-                if is_stale && self.worker.is_some() {
-                    return self.plan_anew(computing, moment);
-                }
-                self.take_plan(computing, *plan, moment, Instant::now(), step_seconds);
-            }
-        }
-    }
-
-    /// Has the plan of an order made from where the mesh is now. The worker may be at a forecast: the
-    /// mesh waits for the plan, not the solver.
-    fn plan_anew(&mut self, computing: Computing, moment: Moment) {
-        let (stack, asked) = match self.asked(&computing.order) {
-            Ok(asked) => asked,
-            Err(error) => return self.log.reject(&computing.id, moment, &error.into()),
-        };
-        let Some(worker) = &mut self.worker else { return };
-        let number = worker.plan(asked.clone());
-        let defaults = self.defaults.clone();
-        self.computing =
-            Some(Computing { number, defaults, stack, asked, resting: true, ..computing });
-    }
-
-    /// Makes a plan the motion under way, or says why not.
-    fn commit(
-        &mut self,
-        computing: Computing,
-        plan: Result<Plan, Rejection>,
-        moment: Moment,
-        begun: Instant,
-        step_seconds: Option<f64>,
-    ) {
-        let Computing { id, stack, asked, .. } = computing;
-        let plan = match plan {
-            Ok(plan) => plan,
-            Err(rejection) => return self.log.reject(&id, moment, &rejection),
-        };
-        if let Some(before) = self.motion.take() {
-            self.log.update(&before.id, |order| {
-                order.status = OrderStatus::Applied;
-                order.reason = Some(format!("order {id} went on from shape {}", before.taken));
-            });
-        }
-        let fraction = plan.target().fraction;
-        self.stack =
-            if fraction < 1.0 { stack.clamped(asked.request.kept, fraction) } else { stack };
-        self.looked_ahead = false;
-        lock(&self.present).stack.clone_from(&self.stack);
-        let clamped = (fraction < 1.0).then_some(fraction);
-        self.log.begin(&id, moment, plan.min_scaled_jacobian(), clamped);
-        self.log.update(&id, |order| {
-            order.status = OrderStatus::Applying;
-            order.cycle_applied = Some(moment.cycle);
-            order.shapes = plan.shapes();
-            order.min_scaled_jacobian = plan.min_scaled_jacobian();
-            order.judged = Some(plan.judged());
-            order.largest_displacement = Some(plan.largest_displacement());
-            order.fraction = Some(fraction);
-            order.seconds = plan.seconds();
-            order.added_steps = step_seconds.map(|step| begun.elapsed().as_secs_f64() / step);
-        });
-        self.motion = Some(Motion {
-            id,
-            plan,
-            guard: asked.request.guard,
-            begun: moment,
-            taken: 0.0,
-            reached: 0.0,
-        });
     }
 }

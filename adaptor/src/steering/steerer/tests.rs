@@ -6,7 +6,8 @@ use tombolo_pipelines::language::Command;
 use super::*;
 use crate::{
     journal::Journal,
-    steering::{Events, OrderReport, Received, Source},
+    steering::{Events, OrderReport, OrderStatus, Received, Source},
+    step::Moment,
 };
 
 /// An order that is cancelled while it is planned does not end the planning of the next one, which

@@ -1,4 +1,4 @@
-//! Orders that wait: for the end of a pause, and no longer than they may.
+//! Orders that wait: for their turn, for the end of a pause, and no longer than they may.
 
 use std::{
     sync::Arc,
@@ -8,13 +8,80 @@ use std::{
 use tombolo_deform::shape::Plan;
 use tombolo_pipelines::language::Order;
 
-use super::{Computing, Steerer};
+use super::{Computing, Steerer, Task};
 use crate::{
-    steering::{Reservation, planner::Rejection},
+    steering::{OrderStatus, Reservation, known::NEXT_CALL, planner::Rejection},
     step::Moment,
 };
 
 impl Steerer {
+    /// Puts an order into the queue, with the room that it takes there: at the end, or where a
+    /// withdrawn one was.
+    pub(crate) fn take(
+        &mut self,
+        id: String,
+        order: Order,
+        background: bool,
+        reservation: Option<Reservation>,
+        index: Option<usize>,
+    ) {
+        let background = background && self.worker.is_some();
+        let index = index.unwrap_or(self.waiting.len()).min(self.waiting.len());
+        self.waiting.insert(index, Task { id, order, background, reservation, behind: None });
+        self.say_why(index);
+        self.say_why(index + 1);
+    }
+
+    /// Says what the order at a place of the queue waits for, where that has changed.
+    pub(crate) fn say_why(&mut self, index: usize) {
+        let before = match index.checked_sub(1).and_then(|index| self.waiting.get(index)) {
+            Some(before) => Some(&before.id),
+            None => self.computing.as_ref().map(|computing| &computing.id),
+        };
+        let before = before.cloned();
+        let Some(task) = self.waiting.get_mut(index) else { return };
+        if task.behind == before {
+            return;
+        }
+        let reason = match &before {
+            Some(before) => format!("order {before}, which came before it"),
+            None => NEXT_CALL.into(),
+        };
+        task.behind = before;
+        self.log.update(&task.id, |order| order.waits_for = Some(reason));
+    }
+
+    /// Takes an order out of the queue, or one that does not move the mesh yet, and returns its place
+    /// in the queue; the error says that it moves the mesh already. `None` where it is neither.
+    /// Another order takes that place, or the one behind [says](Self::say_why) what it waits for now.
+    pub(crate) fn withdraw(&mut self, id: &str) -> Option<Result<usize, String>> {
+        if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
+            self.waiting.remove(index);
+            return Some(Ok(index));
+        }
+        if let Some(computing) = self.computing.take_if(|computing| computing.id == id) {
+            if let Some(worker) = &self.worker {
+                worker.cancel(computing.number);
+            }
+            return Some(Ok(0));
+        }
+        let motion = self.motion.as_ref().filter(|motion| motion.id == id)?;
+        Some(Err(format!(
+            "order '{id}' moves the mesh already (shape {} of {}), so that it cannot be taken back; an order {{\"undo\": 1}} goes back",
+            motion.taken,
+            motion.plan.shapes()
+        )))
+    }
+
+    /// Puts an order whose plan was given up back to its place, the first of the queue.
+    pub(super) fn wait_again(&mut self, task: Task) {
+        self.log.update(&task.id, |order| {
+            order.status = OrderStatus::Accepted;
+            order.waits_for = Some(NEXT_CALL.into());
+        });
+        self.waiting.push_front(task);
+    }
+
     /// Says whether the run is paused. Until it goes on no order begins to move the mesh, so that each
     /// can be taken back. It goes on in the cycle in which it was paused: the wait changes no cycle at
     /// which an order takes effect.
@@ -111,5 +178,6 @@ impl Steerer {
             self.computing.take_if(|computing| computing.id == id);
             self.log.reject(&id, moment, &reason.into());
         }
+        (0..self.waiting.len()).for_each(|index| self.say_why(index));
     }
 }

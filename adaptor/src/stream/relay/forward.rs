@@ -50,7 +50,7 @@ pub(super) async fn forward(
 ) -> Response {
     let said = |status: StatusCode, text: &'static str| (status, text).into_response();
     // A run takes nothing else, so that no body goes to it.
-    if request.method() != Method::GET {
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return said(StatusCode::METHOD_NOT_ALLOWED, "");
     }
     let (name, rest) = named(request.uri());

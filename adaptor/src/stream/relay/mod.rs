@@ -268,7 +268,7 @@ impl Relay {
         let path = self.directory.join("relay.link");
         self.links = None;
         self.links = Some(LinkFile::write(path.clone(), &format!("page: {}\n", self.link()))?);
-        let key = self.state.credentials.key(Access::Watch, None).ok();
+        let key = self.state.credentials.sessions.key(Access::Watch, None).ok();
         let mut text = match key.filter(|_| terminal) {
             Some(key) => format!(
                 "open {}\nIt opens one browser, once; a link for others is in {}",

@@ -18,7 +18,7 @@ from ._waiting import Parts, Result, moment_after
 from .errors import CallError
 from .events import check_kinds
 from .orders import Command, Edits, Forecast, Given, Order, id_of
-from .run import Run, _text
+from .run import WHEEL, Run, _text, left
 from .run import connect as _connect
 
 if TYPE_CHECKING:
@@ -322,9 +322,9 @@ class AsyncRun:
         """Make a link for somebody else, as `Run.link_for` does."""
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
-    async def _send(self, send: Callable[[_native.Client], str]) -> str:
+    async def _send(self, send: Callable[[_native.Client], str], timeout: Optional[float] = None) -> str:
         """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
-        await self.drive()
+        await self.drive(timeout)
         # Behind the last wait, on the loop: it only queues.
         return send(self.run._reader.client)
 
@@ -332,9 +332,9 @@ class AsyncRun:
         return await _carry_out(self.run._reader, parts)
 
     async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
-        seconds(timeout)
-        command = Command(self.run, await self._send(send), task)
-        return await self._carry_out(command._wait(timeout))
+        begin = clock.monotonic()
+        command = Command(self.run, await self._send(send, timeout), task)
+        return await self._carry_out(command._wait(left(begin, timeout), timeout))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it."""
@@ -363,10 +363,10 @@ class AsyncRun:
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
-    async def drive(self, timeout: float = 8.0) -> None:
+    async def drive(self, timeout: Optional[float] = None) -> None:
         """Take the wheel, as `Run.drive` does."""
-        until = moment_after(timeout)
-        while not await _in_thread(lambda: self.run._ask_for_wheel(until)):
+        until = moment_after(WHEEL if timeout is None else timeout)
+        while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
             pass
 
     async def surface(self) -> Surface:

@@ -22,13 +22,18 @@ if TYPE_CHECKING:
 __all__ = ["Run", "connect"]
 
 #: How long the wheel is asked for: longer than a server keeps it for a driver that was lost.
-_WHEEL = 8.0
+WHEEL = 8.0
 #: How long it is asked for at once.
 _SLICE = 0.2
 #: How long one who has left may still be told as the driver.
 _LEAVING = 3.0
 #: How links begin.
 _SCHEMES = ("http://", "https://", "unix:")
+
+
+def left(begin: float, timeout: Optional[float]) -> Optional[float]:
+    """What is left of so many seconds since `begin`."""
+    return None if timeout is None else max(begin + timeout - clock.monotonic(), 0.0)
 
 
 class Run(Watched):
@@ -57,18 +62,26 @@ class Run(Watched):
         with self._reader.changed:
             return [Order(self, identity) for identity in self._state.orders]
 
-    def drive(self, timeout: float = _WHEEL) -> None:
+    def drive(self, timeout: Optional[float] = None) -> None:
         """Take the wheel: what every command does first.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most. Left out: some seconds where the wheel is kept for another, and as long as a lost
+            connection is made again.
 
         Raises
         ------
         NotDriverError
             Somebody else steers, or this client may only watch.
+        WaitError
+            Nothing was said within `timeout`.
         EndedError, LinkError
             The run has ended, or the connection was lost for good.
         """
-        until = moment_after(timeout)
-        while not self._ask_for_wheel(until):
+        until = moment_after(WHEEL if timeout is None else timeout)
+        while not self._ask_for_wheel(until, timeout is None):
             pass
 
     def hand_over(self, to: str, timeout: float = 60.0) -> None:
@@ -98,8 +111,11 @@ class Run(Watched):
         patience = seconds(timeout)
         self._ask(lambda client: client.hand_over(to, patience))
 
-    def _ask_for_wheel(self, until: float) -> bool:
-        """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then."""
+    def _ask_for_wheel(self, until: float, reconnects: bool) -> bool:
+        """Ask for the wheel for a moment; whether it is there. An error where it will not be, or is not by then.
+
+        With `reconnects` a connection that is being made again is waited for beyond that.
+        """
         self._reader.check_goes_on()
         if self._watch:
             raise NotDriverError("this client only watches: it was connected with watch=True")
@@ -109,6 +125,9 @@ class Run(Watched):
             in_thread(lambda: self._reader.client.drive(_SLICE))
         except NotDriverError:
             if self._is_taken(until) or clock.monotonic() >= until:
+                raise
+        except WaitError:
+            if not reconnects and clock.monotonic() >= until:
                 raise
         return self.drives
 
@@ -318,11 +337,12 @@ class Run(Watched):
         return self._give(lambda: self._reader.client.change_pipelines(text), "pipelines", wait, timeout)
 
     def _give(self, give: Callable[[], str], task: str, wait: bool, timeout: Optional[float]) -> Command:
-        # What is wrong is told before anything is sent.
-        seconds(timeout)
-        self.drive()
+        begin = clock.monotonic()
+        self.drive(timeout)
         command = Command(self, give(), task)
-        return command.wait(timeout) if wait else command
+        if wait:
+            self._reader.carry_out(command._wait(left(begin, timeout), timeout))
+        return command
 
     # ---- Elsewhere.
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Reduction};
 
+use super::super::due::Now;
 use super::super::history::Board;
 use super::super::output::{MonitorValues, Output};
 use super::prepare::Names;
@@ -62,6 +63,7 @@ impl Prepared {
     /// there is to say. Rank 0 decides for all. Collective where the pipeline has a budget.
     pub(crate) fn ran(
         &mut self,
+        now: &Now,
         begun: f64,
         ended: f64,
         communicator: &dyn Communicator,
@@ -70,11 +72,15 @@ impl Prepared {
         self.cost.runs += 1;
         self.cost.seconds += seconds;
         self.cost.last_seconds = seconds;
-        if !self.thinning.is_limited() {
+        let rests = now.is_unwatched && self.rest.only_shows();
+        if !rests && !self.thinning.is_limited() {
             return None;
         }
         let mut told = if communicator.rank() == 0 { [seconds, ended] } else { [0.0; 2] };
         communicator.reduce(Reduction::Maximum, &mut told);
+        if rests {
+            self.rest.begin(now, told[0]);
+        }
         self.thinning.ran(told[0], told[1])
     }
 }

@@ -18,9 +18,10 @@ use tombolo_deform::edit::Edit;
 use tombolo_deform::mesh::ArrayView;
 
 use super::cost::{Cost, Thinning};
-use super::due::Clock;
+use super::due::{Clock, Now};
 use super::history::Board;
 use super::output::{MonitorValues, Output};
+use super::rest::Rest;
 use super::trigger::Trigger;
 use crate::derive::{Basis, derive, follow, wall_shear_stress, with_derived};
 use crate::extract::{
@@ -39,6 +40,7 @@ pub(super) struct Prepared {
     /// Its index in the configuration.
     pub(super) index: usize,
     pub(super) due: Clock,
+    pub(super) rest: Rest,
     pub(super) thinning: Thinning,
     pub(super) cost: Cost,
     /// Whether it runs when it is due.
@@ -142,6 +144,18 @@ impl Progress<'_> {
 }
 
 impl Prepared {
+    /// Whether it runs at this step.
+    #[inline]
+    pub(super) fn is_due(&self, now: &Now) -> bool {
+        self.is_chosen
+            && match self.rest.only_shows() {
+                // What went by while it rested is made up for.
+                true if !now.is_unwatched => self.due.has_struck(now),
+                true => self.due.is_due(now) && self.rest.is_over(now),
+                false => self.due.is_due(now),
+            }
+    }
+
     /// Tells the errors that were not there in the last run.
     pub(super) fn report(&mut self, cycle: u64, errors: Vec<Keyed>, outputs: &mut Vec<Output>) {
         let mut keys = HashSet::new();

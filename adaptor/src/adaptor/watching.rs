@@ -1,0 +1,68 @@
+//! The pipelines at work, of which those that only show something rest while nobody watches.
+
+use std::time::Instant;
+
+use tombolo_pipelines::{extract::Channel, language::Command};
+
+use super::{Adaptor, SteeredMesh};
+use crate::step::{Moment, Outside};
+
+impl Adaptor {
+    /// Runs the pipelines that are due; the commands that they give. Collective.
+    pub(super) fn run_pipelines(
+        &mut self,
+        moment: Moment,
+        channels: &[Channel<'_>],
+    ) -> Vec<(String, Command)> {
+        let begun = Instant::now();
+        let parameters = self.parameters.all();
+        let asked = self.pipelines.run(moment, channels, parameters, self.hub.as_ref());
+        self.timing.pipelines.add(begun.elapsed());
+        for fault in asked.faults {
+            self.complain(&fault);
+        }
+        asked.commands
+    }
+
+    /// What pipelines heed of the world outside, as far as any does.
+    #[inline]
+    pub(super) fn outside(&self, entered: Instant) -> Outside {
+        if !self.pipelines.listens() {
+            return Outside::default();
+        }
+        // A run that waits for its first viewer has one when it goes on.
+        let is_waited_for =
+            self.config.steering.wait_for_viewer && matches!(self.mesh, SteeredMesh::Unknown);
+        let hub = self.hub.as_ref();
+        Outside {
+            seconds: entered.duration_since(self.timing.begun).as_secs_f64(),
+            viewers: hub.map_or(0, |hub| hub.arrivals()),
+            is_watched: is_waited_for || hub.is_some_and(|hub| hub.is_watched()),
+        }
+    }
+
+    /// Has views that rested made from this step on once somebody watches; from the next one on, where
+    /// the solver was told that this one looks at nothing. Collective.
+    #[inline]
+    pub(super) fn notice_viewers(&mut self, outside: Outside) {
+        if outside.is_watched
+            && !self.pipelines.is_watched()
+            && !self.communicator.any(*self.is_spared.get_mut())
+        {
+            self.pipelines.set_watched(true);
+        }
+    }
+
+    /// Has views that rest made before the run waits, where the solver has lent what they need: whoever
+    /// comes meanwhile sees the run as it is. Collective.
+    pub(super) fn show_before_waiting(&mut self, moment: Moment, channels: &[Channel<'_>]) {
+        if self.pipelines.is_watched() || self.communicator.any(*self.is_spared.get_mut()) {
+            return;
+        }
+        self.pipelines.set_watched(true);
+        if self.pipelines.is_due(moment) {
+            // A pipeline that only shows something gives no command.
+            self.run_pipelines(moment, channels);
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Runs that nobody watches: their views rest, and what becomes of them is a stated policy.
+
+mod common;
+
+use std::{
+    num::NonZeroU32,
+    sync::Arc,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use common::{LINK_TO_ALL, PATIENCE, Solver, Viewer, config};
+use serde_json::{Value, json};
+use tokio_tungstenite::tungstenite::Message;
+use tombolo::{
+    Settings, Step,
+    communicator::{Communicator, threads},
+    deform::{distributed::Part, shapes::box_of_tets},
+    pipelines::{
+        extract::{Channel, FieldView},
+        language::{Unwatched, parse, parse_orders},
+    },
+};
+
+/// Reads until a frame of a cycle comes.
+fn see(viewer: &mut Viewer, cycle: u64) {
+    let begun = Instant::now();
+    while !viewer.decoded().iter().any(|frame| frame.cycle == cycle) {
+        assert!(begun.elapsed() < PATIENCE, "no frame of cycle {cycle} came");
+        viewer.look_for("nothing", Duration::from_millis(10), |_| true);
+    }
+}
+
+/// How often the first pipeline ran, as a status says.
+fn runs(status: &Value) -> u64 {
+    status["pipelines"][0]["runs"].as_u64().unwrap_or(0)
+}
+
+#[test]
+fn a_view_rests_while_nobody_watches_and_is_there_for_whoever_comes() {
+    let mut solver = Solver::with_config(LINK_TO_ALL);
+    solver.steps(400);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    let rested = runs(&viewer.wait_for("status", |_| true));
+    assert!((1..200).contains(&rested), "{rested} runs for nobody");
+    // Without a step there is something to see, if not the newest.
+    let begun = Instant::now();
+    while viewer.frames.is_empty() {
+        assert!(begun.elapsed() < PATIENCE, "there is nothing to see");
+        viewer.look_for("nothing", Duration::from_millis(10), |_| true);
+    }
+    // The next step is seen, and each behind it.
+    for cycle in 400..410 {
+        solver.step();
+        see(&mut viewer, cycle);
+    }
+    viewer.wait_for("status", |status| runs(status) == rested + 10);
+    drop(viewer);
+    std::thread::sleep(Duration::from_millis(300));
+    solver.steps(400);
+    let report = solver.finish();
+    assert!(report.pipelines[0].runs < rested + 210, "{report:?}");
+}
+
+#[test]
+fn a_recording_misses_nothing_though_nobody_watches() {
+    let output = tempfile::tempdir().unwrap();
+    let text = r#"{"version": 1, "record": "run.tombolo", "pipelines": [
+        {"name": "boundary", "stages": [{"surface": {}}, {"stream": {}}]}]}"#;
+    let settings =
+        Settings { config: config(text), output: output.path().into(), ..Settings::default() };
+    let mut solver = Solver::new(settings);
+    solver.steps(50);
+    assert_eq!(solver.finish().pipelines[0].runs, 50);
+}
+
+/// A solver that steps on a thread of its own until it is stopped.
+fn goes_on(mut solver: Solver) -> JoinHandle<Solver> {
+    std::thread::spawn(move || {
+        solver.step_until("a stop", |solver| solver.stopped);
+        solver
+    })
+}
+
+/// Whoever comes to a run that was paused meanwhile sees the cycle in which it was.
+#[test]
+fn a_pause_that_nobody_saw_is_shown_as_it_is() {
+    let orders = r#"[{"at": {"cycle": 300}, "pause": {}}]"#;
+    let orders = parse_orders(orders, "orders.json").unwrap();
+    let solver =
+        Solver::new(Settings { config: config(LINK_TO_ALL), orders, ..Settings::default() });
+    let url = common::socket_url(&solver.adaptor);
+    let running = goes_on(solver);
+    std::thread::sleep(Duration::from_millis(1500));
+    let mut viewer = Viewer::try_connect(&url).expect("connected");
+    viewer.hello();
+    let status = viewer.wait_for("status", |status| status["paused"] == true);
+    assert_eq!(status["cycle"], 300);
+    see(&mut viewer, 300);
+    viewer.send(&json!({"stop": {}}));
+    running.join().unwrap().finish();
+}
+
+fn second(policy: fn(NonZeroU32) -> Unwatched) -> Solver {
+    let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    settings.config.steering.unwatched = Some(policy(NonZeroU32::MIN));
+    Solver::new(settings)
+}
+
+#[test]
+fn a_run_that_nobody_watches_is_paused_where_that_is_wanted() {
+    let solver = second(Unwatched::PauseAfter);
+    let url = common::socket_url(&solver.adaptor);
+    let running = goes_on(solver);
+    for id in ["first", "second"] {
+        std::thread::sleep(Duration::from_millis(1500));
+        let mut viewer = Viewer::try_connect(&url).expect("connected");
+        viewer.hello();
+        // It does not go on by itself for one who looks.
+        viewer.wait_for("status", |status| status["paused"] == true);
+        viewer.send(&json!({"id": id, "resume": {}}));
+        viewer.wait_for("done", |done| done["id"] == id);
+        viewer.wait_for("status", |status| status["paused"] == false);
+        // As long as somebody watches, it goes on.
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_millis(1500) {
+            viewer.seen.clear();
+            let status = viewer.wait_for("status", |_| true);
+            assert_eq!(status["paused"], false, "{status}");
+        }
+        // The wheel is not kept for one that has closed.
+        viewer.send_message(Message::Close(None));
+        viewer.closed();
+    }
+    std::thread::sleep(Duration::from_millis(1500));
+    let mut viewer = Viewer::try_connect(&url).expect("connected");
+    viewer.hello();
+    viewer.wait_for("status", |status| status["paused"] == true);
+    viewer.send(&json!({"stop": {}}));
+    running.join().unwrap().finish();
+}
+
+#[test]
+fn a_run_that_nobody_watches_is_stopped_where_that_is_wanted() {
+    // Nobody ever comes.
+    let begun = Instant::now();
+    goes_on(second(Unwatched::StopAfter)).join().unwrap().finish();
+    assert!(begun.elapsed() > Duration::from_millis(900));
+    // The driver pauses it, and leaves.
+    let mut solver = second(Unwatched::StopAfter);
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    solver.step();
+    let running = goes_on(solver);
+    viewer.send(&json!({"pause": {}}));
+    viewer.wait_for("status", |status| status["paused"] == true);
+    std::thread::sleep(Duration::from_millis(1500));
+    assert!(!running.is_finished(), "somebody watches");
+    drop(viewer);
+    running.join().unwrap().finish();
+}
+
+/// A replay is carried out to its end, whoever watches.
+#[test]
+fn a_replay_is_not_stopped_because_nobody_watches() {
+    let mut settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+    settings.config.steering.unwatched = Some(Unwatched::StopAfter(NonZeroU32::MIN));
+    settings.replay = Some(Default::default());
+    let mut solver = Solver::new(settings);
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_millis(1500) {
+        solver.step();
+    }
+    assert!(!solver.stopped);
+    solver.finish();
+}
+
+#[test]
+fn what_becomes_of_a_run_that_nobody_watches_is_said_in_its_configuration() {
+    let steering = |text: &str| {
+        let text = LINK_TO_ALL.replacen('{', &format!("{{\"steering\": {text}, "), 1);
+        parse(&text, "test.json").map(|config| config.steering.unwatched)
+    };
+    let seconds = NonZeroU32::new(600).unwrap();
+    let found = steering(r#"{"unwatched": {"pause_after": 600}}"#).unwrap();
+    assert_eq!(found, Some(Unwatched::PauseAfter(seconds)));
+    let found = steering(r#"{"unwatched": {"stop_after": 600}, "resume_after": 5}"#).unwrap();
+    assert_eq!(found, Some(Unwatched::StopAfter(seconds)));
+    assert_eq!(steering("{}").unwrap(), None);
+    let both = steering(r#"{"unwatched": {"pause_after": 600}, "resume_after": 5}"#);
+    let both = both.unwrap_err().to_string();
+    assert!(both.contains("steering.unwatched.pause_after: found `resume_after` too"), "{both}");
+    let alone = r#"{"version": 1, "steering": {"unwatched": {"stop_after": 5}}}"#;
+    let alone = parse(alone, "alone.json").unwrap_err().to_string();
+    assert!(alone.contains("steering.unwatched: there is no `stream`"), "{alone}");
+}
+
+/// All ranks take a view, or none does, whenever viewers come and go.
+#[test]
+fn views_rest_on_all_ranks_alike() {
+    const RANKS: usize = 3;
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let runs = threads::run(RANKS, |ranks| {
+        let (rank, cells) = (ranks.rank(), mesh.cells().len());
+        let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+        let part = Part::cut(&mesh, &of_cells, rank, true).expect("a part");
+        let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
+        let mut adaptor = settings.on(Arc::new(ranks)).start().expect("initialize");
+        let speed: Vec<f64> = part.points.iter().map(|[x, y, z]| x + y * z).collect();
+        let fields = [FieldView::vertex("speed", &speed)];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: &fields }];
+        let mut viewer = None::<Viewer>;
+        for cycle in 0..300 {
+            if rank == 0 && cycle % 100 == 50 {
+                let viewer = viewer.insert(Viewer::connect(&adaptor));
+                viewer.hello();
+            }
+            let step = Step { cycle, time: cycle as f64 * 0.01, time_step: 0.01 };
+            // A solver that asks first is told before a step whether it is looked at.
+            let asks = cycle >= 200;
+            let looks = asks && adaptor.looks_at(&step);
+            adaptor.execute(&step, &channels).expect("execute");
+            let first = if asks { 51 } else { 50 };
+            if rank == 0 && (first..60).contains(&(cycle % 100)) {
+                assert!(looks || !asks, "cycle {cycle}");
+                see(viewer.as_mut().expect("a viewer"), cycle);
+            }
+            if rank == 0 && cycle % 100 == 60 {
+                viewer = None;
+                std::thread::sleep(Duration::from_millis(300));
+            }
+        }
+        adaptor.finalize().expect("finalize").pipelines[0].runs
+    });
+    assert!(runs.iter().all(|of_rank| *of_rank == runs[0]), "{runs:?}");
+    assert!((30..250).contains(&runs[0]), "{runs:?}");
+}

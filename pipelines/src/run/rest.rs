@@ -1,0 +1,59 @@
+//! Views rest while nobody looks.
+
+use super::due::Now;
+use crate::language::{Action, Due, Pipeline, Stage};
+
+/// The most that a view takes of the time while nobody looks. It is taken now and then all the same, so
+/// that whoever comes has something to see at once.
+const SHARE: f64 = 1e-3;
+
+/// Whether a pipeline rests: one that only shows something does while nobody looks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rest {
+    only_shows: bool,
+    /// Until this second on the clock of rank 0.
+    until: f64,
+}
+
+impl Rest {
+    pub(super) fn of(pipeline: &Pipeline) -> Self {
+        Self { only_shows: only_shows(pipeline), until: 0.0 }
+    }
+
+    /// Whether nothing comes of the pipeline but what viewers see.
+    pub(super) fn only_shows(&self) -> bool {
+        self.only_shows
+    }
+
+    /// Whether it has rested for long enough.
+    #[inline]
+    pub(super) fn is_over(&self, now: &Now) -> bool {
+        now.seconds >= self.until
+    }
+
+    /// Rests for so long that a run of these seconds is no more than its share of the time.
+    pub(super) fn begin(&mut self, now: &Now, seconds: f64) {
+        self.until = now.seconds + seconds / SHARE;
+    }
+}
+
+/// Whether nothing comes of a pipeline but what viewers see, so that nobody misses a run that nobody
+/// sees. One that runs once is not among these: its moment does not come again.
+fn only_shows(pipeline: &Pipeline) -> bool {
+    let is_shown = |stage: &Stage| {
+        stage.is_source()
+            || stage.derived_name().is_some()
+            || matches!(
+                stage,
+                Stage::Select(_)
+                    | Stage::WallShearStress(_)
+                    | Stage::Decimate(_)
+                    | Stage::Stream(_)
+            )
+    };
+    matches!(pipeline.due, Due::Every(_))
+        && pipeline.streams()
+        && pipeline.when.is_none()
+        && pipeline.stages.iter().all(is_shown)
+        && pipeline.then.iter().all(|action| matches!(action, Action::Stream(_)))
+}
