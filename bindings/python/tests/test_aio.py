@@ -57,10 +57,10 @@ def test_what_is_cancelled_before_the_wheel_is_there_is_not_given(solver, monkey
         run.wait_for(lambda: run.features and run.status.driver, 30)
         ask_for_wheel = run._ask_for_wheel
 
-        def ask_again(until):
+        def ask_again(until, reconnects):
             # As for a wheel that is kept for one who has left, though this one is there as long as anybody asks.
             try:
-                return ask_for_wheel(until)
+                return ask_for_wheel(until, reconnects)
             except tombolo.NotDriverError:
                 time.sleep(0.05)
                 return False

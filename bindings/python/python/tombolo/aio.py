@@ -333,9 +333,8 @@ class AsyncRun:
 
     async def _give(self, send: Callable[[_native.Client], str], task: str, timeout: Optional[float]) -> Command:
         begin = clock.monotonic()
-        seconds(timeout)
         command = Command(self.run, await self._send(send, timeout), task)
-        return await self._carry_out(command._wait(left(begin, timeout)))
+        return await self._carry_out(command._wait(left(begin, timeout), timeout))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it."""

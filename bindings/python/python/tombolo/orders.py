@@ -8,8 +8,9 @@ import time as clock
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
+from ._reader import late
 from ._waiting import Parts, moment_after
-from .errors import ConfigurationError, EndedError, RejectedError, TomboloError
+from .errors import ConfigurationError, EndedError, RejectedError, TomboloError, WaitError
 
 if TYPE_CHECKING:
     from .aio import AsyncOrder
@@ -243,12 +244,15 @@ class Command:
         WaitError
             It did not take effect in time; it may still.
         """
-        return self._run._reader.carry_out(self._wait(timeout))
+        return self._run._reader.carry_out(self._wait(timeout, timeout))
 
-    def _wait(self, timeout: Optional[float]) -> Parts[Command]:
-        until = moment_after(timeout)
+    def _wait(self, timeout: Optional[float], given: Optional[float]) -> Parts[Command]:
+        """Wait so many seconds: what is left of those that were given, which an error tells."""
+        until, in_vain = moment_after(timeout), f"the command {self.id} ({self.task}) did not take effect"
         try:
-            answer = yield self._answer, timeout, f"the command {self.id} ({self.task}) did not take effect"
+            answer = yield self._answer, timeout, in_vain
+        except WaitError:
+            raise late(in_vain, given) from None
         except EndedError:
             # A run that was asked to stop may end before it has answered.
             if self.task == "stop":

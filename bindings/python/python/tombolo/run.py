@@ -338,11 +338,11 @@ class Run(Watched):
 
     def _give(self, give: Callable[[], str], task: str, wait: bool, timeout: Optional[float]) -> Command:
         begin = clock.monotonic()
-        # What is wrong is told before anything is sent.
-        seconds(timeout)
         self.drive(timeout)
         command = Command(self, give(), task)
-        return command.wait(left(begin, timeout)) if wait else command
+        if wait:
+            self._reader.carry_out(command._wait(left(begin, timeout), timeout))
+        return command
 
     # ---- Elsewhere.
 
