@@ -324,7 +324,8 @@ impl Adaptor {
         self.saved = None;
         let moved = match met {
             Some((called, outside)) => {
-                self.notice_viewers(outside);
+                // What it wakes was not due when the coordinates were checked.
+                let called = self.notice_viewers(outside) || called;
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;
                 if self.pipelines.listens() {
@@ -503,14 +504,10 @@ impl Adaptor {
         }
         let mut commands = Vec::new();
         if self.pipelines.is_due(moment) {
-            let asked = self.run_pipelines(moment, channels);
-            // A replay has the commands from the journal.
-            commands = if self.is_replay { Vec::new() } else { asked };
+            commands = self.run_pipelines(moment, channels);
         }
         self.obey_again(moment, false);
-        for (pipeline, command) in commands {
-            self.accept(None, Source::Pipeline(pipeline), command, moment);
-        }
+        self.accept_from_pipelines(commands, moment);
         for timed in self.timed.take_due(moment) {
             self.accept(timed.id, Source::File, timed.command, moment);
         }

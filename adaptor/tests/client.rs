@@ -327,7 +327,8 @@ fn a_command_that_the_network_swallows_is_sent_again() {
 fn silence_is_no_refusal_of_the_wheel() {
     let run = Run::new(LINK_TO_ALL);
     let proxy = Proxy::to(run.address);
-    let client = Client::connect(&run.over(proxy.port), &quick()).expect("connected");
+    let options = Options { drives: Drives::OnRequest, ..quick() };
+    let client = Client::connect(&run.over(proxy.port), &options).expect("connected");
     proxy.swallow(true);
     let silent = client.drive(Duration::from_millis(300));
     assert!(matches!(silent, Err(ClientError::NoAnswer { .. })), "{silent:?}");

@@ -24,19 +24,22 @@ impl Desk {
     /// # Errors
     /// Where the program `taskset` is missing or fails.
     pub fn set_apart() -> Result<Self, Box<dyn Error>> {
-        let last = std::thread::available_parallelism()?.get() - 1;
-        if last == 0 {
-            return Ok(Self { core: None });
-        }
         let own = process::id().to_string();
-        let cores = format!("0-{}", last - 1);
-        peer::run(Command::new("taskset").args([
-            "--all-tasks",
-            "--pid",
-            "--cpu-list",
-            &cores,
-            &own,
-        ]))?;
+        // Such as "pid 42's current affinity list: 0-3,8".
+        let told = peer::run(Command::new("taskset").args(["--pid", "--cpu-list", &own]))?;
+        let allowed = told.trim().rsplit(' ').next().unwrap_or_default();
+        let mut cores = Vec::new();
+        for range in allowed.split(',') {
+            let (first, last) = range.split_once('-').unwrap_or((range, range));
+            cores.extend(first.parse::<usize>()?..=last.parse()?);
+        }
+        let Some((&last, others)) = cores.split_last().filter(|(_, others)| !others.is_empty())
+        else {
+            return Ok(Self { core: None });
+        };
+        let others: Vec<String> = others.iter().map(usize::to_string).collect();
+        let arguments = ["--all-tasks", "--pid", "--cpu-list", &others.join(","), &own];
+        peer::run(Command::new("taskset").args(arguments))?;
         Ok(Self { core: Some(last) })
     }
 

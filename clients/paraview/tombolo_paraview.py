@@ -224,8 +224,8 @@ class _Linked(_Algorithm):
 
     def __init__(self):
         super().__init__()
+        # What holds the run. VTK keeps the attributes of what ParaView has deleted, until others take their place.
         self._held = held = []
-        # VTK keeps the attributes of what ParaView has deleted, until others take their place.
         self.AddObserver("DeleteEvent", lambda *_: held.clear())
 
     SetLink = _setter("link")
@@ -539,7 +539,10 @@ class TomboloOrder(_Linked):
 
     def __init__(self):
         super().__init__()
-        self._requests, self._shown = Requests(), None
+        self._requests = requests = Requests()
+        self._shown = None
+        # An order that was given holds the run, too.
+        self.AddObserver("DeleteEvent", lambda *_: requests.forget())
 
     SetArray = _setter("array")
     SetSteps = _setter("steps")

@@ -211,7 +211,8 @@ fn a_budget_thins_the_cadence_alike_on_all_ranks() {
 fn views_rest_while_nobody_looks() {
     let pipelines = r#"
         {"name": "view", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
-        {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}, {"stream": {}}]},
+        {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}, {"surface": {}}, {"stream": {}}]},
+        {"name": "limited", "every": {"steps": 2}, "budget": {"percent": 0.1}, "stages": [{"surface": {}}, {"stream": {}}]},
         {"name": "once", "at": {"cycle": 7}, "stages": [{"surface": {}}, {"stream": {}}]}"#;
     let made = threads::run(3, |ranks| {
         let rank = ranks.rank();
@@ -243,6 +244,9 @@ fn views_rest_while_nobody_looks() {
         assert_eq!(of(&ran, "view"), [0, 2, 4, 10, 16, 19, 20, 22, 24]);
         assert_eq!(of(&ran, "health"), (0..26).step_by(2).collect::<Vec<_>>());
         assert_eq!(of(&ran, "once"), [7]);
+        // One that its budget thins is fresh for whoever comes, too.
+        let limited = of(&ran, "limited");
+        assert!(limited.contains(&19) && limited.len() < of(&ran, "view").len(), "{limited:?}");
     }
 }
 

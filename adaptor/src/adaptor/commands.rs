@@ -43,6 +43,20 @@ impl Adaptor {
         }
     }
 
+    /// Takes in what pipelines command; a replay has it from the journal. Collective.
+    pub(super) fn accept_from_pipelines(
+        &mut self,
+        commands: Vec<(String, Command)>,
+        moment: Moment,
+    ) {
+        if self.is_replay {
+            return;
+        }
+        for (pipeline, command) in commands {
+            self.accept(None, Source::Pipeline(pipeline), command, moment);
+        }
+    }
+
     fn take_in(
         &self,
         id: Option<String>,

@@ -42,15 +42,16 @@ impl Adaptor {
     }
 
     /// Has views that rested made from this step on once somebody watches; from the next one on, where
-    /// the solver was told that this one looks at nothing. Collective.
+    /// the solver was told that this one looks at nothing. Whether they are from now on. Collective.
     #[inline]
-    pub(super) fn notice_viewers(&mut self, outside: Outside) {
-        if outside.is_watched
+    pub(super) fn notice_viewers(&mut self, outside: Outside) -> bool {
+        let wakes = outside.is_watched
             && !self.pipelines.is_watched()
-            && !self.communicator.any(*self.is_spared.get_mut())
-        {
+            && !self.communicator.any(*self.is_spared.get_mut());
+        if wakes {
             self.pipelines.set_watched(true);
         }
+        wakes
     }
 
     /// Has views that rest made before the run waits, where the solver has lent what they need: whoever
@@ -61,8 +62,8 @@ impl Adaptor {
         }
         self.pipelines.set_watched(true);
         if self.pipelines.is_due(moment) {
-            // A pipeline that only shows something gives no command.
-            self.run_pipelines(moment, channels);
+            let commands = self.run_pipelines(moment, channels);
+            self.accept_from_pipelines(commands, moment);
         }
     }
 }

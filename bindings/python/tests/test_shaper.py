@@ -241,7 +241,7 @@ def test_long_work_tells_how_long_and_is_given_up():
 
 
 def test_a_refused_call_of_another_thread_takes_no_cancellation_back():
-    points, tets = box(20)
+    points, tets = box(28)
     shaper, refused = shaper_of(points, tets, ends(points, tets)), []
     turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 45}}]
 

@@ -60,6 +60,11 @@ impl Thinning {
         true
     }
 
+    /// Judges by what comes from the next run on: what was before is of another cadence.
+    pub(super) fn forget(&mut self) {
+        (self.since, self.spent, self.runs) = (None, 0.0, 0);
+    }
+
     /// Notes a run that took so many seconds and ended at this second of the clock; where the
     /// cadence changes, what there is to say.
     pub(super) fn ran(&mut self, seconds: f64, now: f64) -> Option<String> {

@@ -219,7 +219,8 @@ impl Runner {
                 continue;
             }
             prepared.due.take(&now);
-            if !prepared.thinning.admits() {
+            let is_back = prepared.rest.ends(&now);
+            if !(prepared.thinning.admits() || is_back) {
                 continue;
             }
             let begun = (self.clock)();

@@ -13,11 +13,12 @@ pub(super) struct Rest {
     only_shows: bool,
     /// Until this second on the clock of rank 0.
     until: f64,
+    has_rested: bool,
 }
 
 impl Rest {
     pub(super) fn of(pipeline: &Pipeline) -> Self {
-        Self { only_shows: only_shows(pipeline), until: 0.0 }
+        Self { only_shows: only_shows(pipeline), until: 0.0, has_rested: false }
     }
 
     /// Whether nothing comes of the pipeline but what viewers see.
@@ -34,6 +35,12 @@ impl Rest {
     /// Rests for so long that a run of these seconds is no more than its share of the time.
     pub(super) fn begin(&mut self, now: &Now, seconds: f64) {
         self.until = now.seconds + seconds / SHARE;
+        self.has_rested = true;
+    }
+
+    /// Whether this is the first run since somebody looks again.
+    pub(super) fn ends(&mut self, now: &Now) -> bool {
+        !now.is_unwatched && std::mem::take(&mut self.has_rested)
     }
 }
 
@@ -43,13 +50,7 @@ fn only_shows(pipeline: &Pipeline) -> bool {
     let is_shown = |stage: &Stage| {
         stage.is_source()
             || stage.derived_name().is_some()
-            || matches!(
-                stage,
-                Stage::Select(_)
-                    | Stage::WallShearStress(_)
-                    | Stage::Decimate(_)
-                    | Stage::Stream(_)
-            )
+            || matches!(stage, Stage::Select(_) | Stage::WallShearStress(_) | Stage::Stream(_))
     };
     matches!(pipeline.due, Due::Every(_))
         && pipeline.streams()

@@ -175,7 +175,7 @@ class Reader:
     # ---- Waiting.
 
     def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None, in_vain: str = NOT_FOUND) -> Found:
-        """As `Run.wait_for`; `in_vain` is what an error says that did not come."""
+        """What is asked for at each event until it is there; `in_vain` is what an error says that did not come."""
         until = moment_after(timeout)
         with self.changed:
             while True:

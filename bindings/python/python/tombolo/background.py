@@ -141,6 +141,11 @@ class Requests:
         # The last order or undo, behind the number of its question.
         self._order: tuple[int, Optional[Order]] = 0, None
 
+    def forget(self) -> None:
+        """Let go of the last order, and of the run that it was given to."""
+        with self._lock:
+            self._order = self._order[0], None
+
     def forecast(self, run: Run, edits: Edits, **settings: Any) -> None:
         """Ask what an order would come to. Parameters as of `Run.forecast`."""
 

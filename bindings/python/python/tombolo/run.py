@@ -127,7 +127,9 @@ class Run(Watched):
             if self._is_taken(until) or clock.monotonic() >= until:
                 raise
         except WaitError:
-            if not reconnects and clock.monotonic() >= until:
+            # One who drives is there to refuse: what says nothing then is only slow.
+            taken = self._state.status is not None and self._state.status.driver is not None
+            if clock.monotonic() >= until and (taken or not reconnects):
                 raise
         return self.drives
 

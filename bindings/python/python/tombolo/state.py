@@ -101,6 +101,8 @@ class State:
         self.end: Optional[dict[str, Any]] = None
         self.monitors = Monitors()
         self.views: dict[str, View] = {}
+        # The names of views that were there once.
+        self.removed: set[str] = set()
         self.orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
         self.answers: OrderedDict[str, tuple[str, Any]] = OrderedDict()
 
@@ -127,10 +129,14 @@ class State:
             self.stack = data.get("stack", self.stack)
             for monitor in data.get("monitors", []):
                 self.monitors._table(monitor["pipeline"])._announce(monitor["name"])
-            # A view that was not announced before may be announced a moment later.
-            for name in {view["name"] for view in self.hello.get("views", [])}:
-                if all(view["name"] != name for view in data.get("views", [])):
-                    self.views.pop(name, None)
+            before, now = ({view["name"] for view in hello.get("views", [])} for hello in (self.hello, data))
+            # One that was removed, and one that is there again, of which a late frame of before may be left. What was
+            # never announced may be so a moment later.
+            gone = before - now
+            back = self.removed & now
+            for name in gone | back:
+                self.views.pop(name, None)
+            self.removed = (self.removed | gone) - now
             self.hello = data
         elif kind == "status":
             self.status = Status._of(data)

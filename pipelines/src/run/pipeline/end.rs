@@ -80,6 +80,8 @@ impl Prepared {
         communicator.reduce(Reduction::Maximum, &mut told);
         if rests {
             self.rest.begin(now, told[0]);
+            self.thinning.forget();
+            return None;
         }
         self.thinning.ran(told[0], told[1])
     }
