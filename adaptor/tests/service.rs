@@ -162,7 +162,7 @@ fn an_order_waits_no_longer_than_it_says_itself() {
     let (mut solver, mut viewer) = beside_a_long_plan(settings);
     let mut order = squeeze(0.1);
     viewer.send(&json!({"id": "patient", "order": order}));
-    order["deadline"] = json!(10);
+    order["deadline"] = json!(1);
     viewer.send(&json!({"id": "late", "order": order}));
     let late = solver.step_until_told(&mut viewer, "order", has_status("late", "rejected"));
     let reason = "it has waited for more than 1 seconds (its own `deadline`)";

@@ -211,7 +211,7 @@ fn a_budget_thins_the_cadence_alike_on_all_ranks() {
 fn views_rest_while_nobody_looks() {
     let pipelines = r#"
         {"name": "view", "every": {"steps": 2}, "stages": [{"surface": {}}, {"stream": {}}]},
-        {"name": "health", "every": {"steps": 2}, "stages": [{"quality": {}}, {"surface": {}}, {"stream": {}}]},
+        {"name": "health", "every": {"steps": 2}, "stages": [{"surface": {}}, {"statistics": {"field": "p"}}, {"stream": {}}]},
         {"name": "limited", "every": {"steps": 2}, "budget": {"percent": 0.1}, "stages": [{"surface": {}}, {"stream": {}}]},
         {"name": "once", "at": {"cycle": 7}, "stages": [{"surface": {}}, {"stream": {}}]}"#;
     let made = threads::run(3, |ranks| {
