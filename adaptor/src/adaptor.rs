@@ -324,7 +324,7 @@ impl Adaptor {
         self.saved = None;
         let moved = match met {
             Some((called, outside)) => {
-                // What it wakes was not due when the coordinates were checked.
+                // The coordinates were checked before these views were due.
                 let called = self.notice_viewers(outside) || called;
                 let is_calm = self.is_calm(moment, called);
                 let moved = !is_calm && self.act(step, moment, called, channels)?;

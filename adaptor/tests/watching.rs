@@ -161,6 +161,26 @@ fn a_run_that_nobody_watches_is_stopped_where_that_is_wanted() {
     running.join().unwrap().finish();
 }
 
+/// A pipeline that is due in the call in which the run is paused gives its command.
+#[test]
+fn what_a_pipeline_commands_while_the_run_pauses_is_not_lost() {
+    let late = json!({"name": "late", "at": {"cycle": 2}, "stages": [{"stop": {}}]});
+    let orders = json!([
+        {"at": {"cycle": 5}, "pipelines": {"set": [late]}},
+        {"at": {"cycle": 5}, "pause": {}},
+    ]);
+    let orders = parse_orders(&orders.to_string(), "orders.json").expect("orders");
+    let settings = Settings { config: config(LINK_TO_ALL), orders, ..Settings::default() };
+    // It would stay paused for ever.
+    let running = goes_on(Solver::new(settings));
+    let begun = Instant::now();
+    while !running.is_finished() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the stop was lost");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    running.join().unwrap().finish();
+}
+
 /// A replay is carried out to its end, whoever watches.
 #[test]
 fn a_replay_is_not_stopped_because_nobody_watches() {

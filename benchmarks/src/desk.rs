@@ -10,7 +10,7 @@ use std::{
 
 use crate::peer;
 
-/// What goes before a program that runs at the desk.
+/// The core that stands for the machine of the engineer.
 #[derive(Clone, Debug)]
 pub struct Desk {
     /// The last core; none where there is one alone.
@@ -18,8 +18,8 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Keeps this process, and all that it starts, off the core of the desk. Goes before anything else:
-    /// pools of threads are as large as the cores that they find.
+    /// Keeps this process, and all that it starts, off the core of the desk. Call it before anything that
+    /// starts threads: a pool has as many as it finds cores.
     ///
     /// # Errors
     /// Where the program `taskset` is missing or fails.
@@ -54,8 +54,8 @@ impl Desk {
         command
     }
 
-    /// Where the desk is, for a report.
-    pub fn place(&self) -> &'static str {
+    /// The words of a report for where programs at the desk run.
+    pub fn description(&self) -> &'static str {
         match self.core {
             Some(_) => "on a core of its own",
             None => "on the core of the run, with the lowest priority",

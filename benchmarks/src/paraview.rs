@@ -54,7 +54,7 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         Row::new(
             format!(
                 "the same, followed in ParaView {}: {shown} steps shown in {seconds} s, or more",
-                desk.place()
+                desk.description()
             ),
             followed.median(),
         ),

@@ -12,22 +12,11 @@ from __future__ import annotations
 
 import sys
 
-import scipy.optimize
 import study
-from throat import throat
+from throat import BOUNDS, throat
 
 # A flow that pressure drives settles slowly: what flows has to be speeded up first.
 SCHEDULE, CRITERION = 5, study.Criterion(window=20, change=1e-3)
-
-
-def search(part: float, tolerance: float) -> study.Search:
-    """A search between half and the whole height for that at which a part of the reference's flow rate passes."""
-
-    def find(ask: study.Ask, reference: float) -> float:
-        wanted = part * reference
-        return float(scipy.optimize.brentq(lambda height: ask(height) - wanted, 0.5, 1.0, xtol=tolerance))
-
-    return find
 
 
 def main() -> int:
@@ -37,7 +26,7 @@ def main() -> int:
     parser.add_argument("--part", type=float, default=0.8, help="the wanted flow rate, in parts of the reference's")
     given = parser.parse_args()
     flows = study.flows(given, study.RATE)
-    comparison = study.compare(flows, throat, search(given.part, given.tolerance))
+    comparison = study.compare(flows, throat, study.reached(given.part, *BOUNDS, given.tolerance))
     wanted = given.part * comparison.running.reference
     print(f"wanted: {wanted:.4g} {study.RATE.unit}")
     return study.conclude(comparison, given, "height", "of the reference's", wanted)

@@ -350,6 +350,19 @@ def compare(flows: Flows, edits: Edits, search: Search) -> Comparison:
     return Comparison(running, restarted, (first, search(restarted.ask, running.reference)))
 
 
+def reached(times: float, lower: float, upper: float, tolerance: float) -> Search:
+    """A search between two bounds for the value at which the quantity is so many times the reference's.
+
+    It is Brent's method for a root.
+    """
+    from scipy.optimize import brentq
+
+    def find(ask: Ask, reference: float) -> float:
+        return float(brentq(lambda value: ask(value) - times * reference, lower, upper, xtol=tolerance))
+
+    return find
+
+
 def least(lower: float, upper: float, tolerance: float) -> Search:
     """A search for the value at which the quantity is least between two bounds, by Brent's method."""
     from scipy.optimize import minimize_scalar

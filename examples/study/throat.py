@@ -13,10 +13,11 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-import scipy.optimize
 import study
 
 SCHEDULE, CRITERION = 5, study.Criterion(window=10, change=1e-3)
+# The heights between which is searched.
+BOUNDS = 0.5, 1.0
 
 
 def throat(height: float) -> list[dict[str, Any]]:
@@ -25,22 +26,12 @@ def throat(height: float) -> list[dict[str, Any]]:
     return [{"scale_direction": {"features": ["throat"], "fixed": ends, "factors": [1, 1, height], "name": "throat"}}]
 
 
-def search(times: float, tolerance: float) -> study.Search:
-    """A search between a half and the whole for the height at which the drop is so many times the reference's."""
-
-    def find(ask: study.Ask, reference: float) -> float:
-        wanted = times * reference
-        return float(scipy.optimize.brentq(lambda height: ask(height) - wanted, 0.5, 1.0, xtol=tolerance))
-
-    return find
-
-
 def main() -> int:
     """The program."""
     parser = study.arguments(__doc__.splitlines()[0], "examples/flow/cases/nozzle.json", 1e-3, SCHEDULE, CRITERION)
     parser.add_argument("--times", type=float, default=1.5, help="the wanted drop, in parts of the reference's")
     given = parser.parse_args()
-    comparison = study.compare(study.flows(given), throat, search(given.times, given.tolerance))
+    comparison = study.compare(study.flows(given), throat, study.reached(given.times, *BOUNDS, given.tolerance))
     wanted = given.times * comparison.running.reference
     print(f"wanted: {wanted:.4g} {study.DROP.unit}")
     return study.conclude(comparison, given, "height", "of the reference's", wanted)

@@ -56,7 +56,7 @@ impl Absence {
         Some(patience)
     }
 
-    /// What becomes of the run now that nobody has watched it for long enough; told once.
+    /// The command for a run that nobody has watched for long enough, and how long that is; given once.
     pub(super) fn of_viewers(&self, hub: &Hub) -> Option<(Duration, Command)> {
         let (patience, command) = match self.of_viewers? {
             Unwatched::PauseAfter(after) => (after, Command::Pause {}),

@@ -24,7 +24,7 @@ impl Adaptor {
         asked.commands
     }
 
-    /// What pipelines heed of the world outside, as far as any does.
+    /// The clock and the viewers, by which pipelines are due; the default where none of them heeds these.
     #[inline]
     pub(super) fn outside(&self, entered: Instant) -> Outside {
         if !self.pipelines.listens() {
@@ -41,8 +41,8 @@ impl Adaptor {
         }
     }
 
-    /// Has views that rested made from this step on once somebody watches; from the next one on, where
-    /// the solver was told that this one looks at nothing. Whether they are from now on. Collective.
+    /// Wakes the views that rest, once somebody watches. Where the solver was told that nothing looks at
+    /// this step, the next one wakes them. Returns whether they are awake from now on. Collective.
     #[inline]
     pub(super) fn notice_viewers(&mut self, outside: Outside) -> bool {
         let wakes = outside.is_watched
@@ -54,8 +54,8 @@ impl Adaptor {
         wakes
     }
 
-    /// Has views that rest made before the run waits, where the solver has lent what they need: whoever
-    /// comes meanwhile sees the run as it is. Collective.
+    /// Makes the views that rest before the run waits, so that whoever comes meanwhile sees it as it is.
+    /// Makes none where the solver was told that nothing looks at this step. Collective.
     pub(super) fn show_before_waiting(&mut self, moment: Moment, channels: &[Channel<'_>]) {
         if self.pipelines.is_watched() || self.communicator.any(*self.is_spared.get_mut()) {
             return;

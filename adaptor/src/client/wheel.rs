@@ -19,8 +19,9 @@ impl Client {
     /// where the last driver's connection was lost.
     ///
     /// # Errors
-    /// [`ClientError::NotDriver`] where it is refused and will be, or still is after `patience`;
-    /// [`ClientError::NoAnswer`] where nothing was said by then, as while a lost connection is made again.
+    /// [`ClientError::NotDriver`] where somebody else drives, or the wheel is still refused after
+    /// `patience`; [`ClientError::NoAnswer`] where the run has said nothing by then, as while a lost
+    /// connection is made again.
     pub fn drive(&self, patience: Duration) -> Result<(), ClientError> {
         let until = Instant::now() + patience.min(Duration::from_secs(1 << 30));
         let hello = self.hello();

@@ -19,7 +19,7 @@ const ORDERS_TOLD: usize = 100;
 /// displacement.
 const TOLD_WHOLE: usize = 16 << 10;
 
-/// What an order waits for that waits for no other.
+/// The reason of an order that waits for no other order.
 pub(super) const NEXT_CALL: &str = "the solver's next call";
 
 /// The commands that were given, as far as they are kept.

@@ -78,16 +78,12 @@ impl Call<'_, '_> {
 }
 
 impl Run {
-    /// The report of a run that has ended; a run in another thread's call has not.
-    fn outcome(&self) -> Option<String> {
-        let held = match self.state.try_lock() {
-            Ok(held) => held,
-            Err(TryLockError::Poisoned(held)) => held.into_inner(),
-            Err(TryLockError::WouldBlock) => return None,
-        };
-        match &held.stage {
-            Stage::Ended(report) => Some(report.clone()),
-            Stage::UnderWay(_) => None,
+    /// The state, where no other thread is in a call.
+    fn free(&self) -> Option<MutexGuard<'_, State>> {
+        match self.state.try_lock() {
+            Ok(held) => Some(held),
+            Err(TryLockError::Poisoned(held)) => Some(held.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
         }
     }
 
@@ -97,13 +93,9 @@ impl Run {
                 "the adaptor was made before this process was forked, and belongs to the other one; make one here",
             ));
         }
-        match self.state.try_lock() {
-            Ok(held) => Ok(held),
-            Err(TryLockError::Poisoned(held)) => Ok(held.into_inner()),
-            Err(TryLockError::WouldBlock) => Err(CallError::new_err(
-                "the adaptor is in another call; one thread at a time can use it",
-            )),
-        }
+        self.free().ok_or_else(|| {
+            CallError::new_err("the adaptor is in another call; one thread at a time can use it")
+        })
     }
 }
 
@@ -360,7 +352,8 @@ impl Run {
 
     #[getter]
     fn ended(&self) -> bool {
-        self.outcome().is_some()
+        // A run that is in a call has not.
+        self.free().is_some_and(|state| matches!(state.stage, Stage::Ended(_)))
     }
 
     /// Tells the other ranks that the solver has failed on this one, which shows no step any more.
@@ -388,7 +381,10 @@ impl Run {
     /// The report of a run that has ended.
     #[getter]
     fn report(&self) -> Option<String> {
-        self.outcome()
+        match &self.free()?.stage {
+            Stage::Ended(report) => Some(report.clone()),
+            Stage::UnderWay(_) => None,
+        }
     }
 }
 

@@ -108,7 +108,7 @@ def test_a_throat_is_found_on_a_running_flow_and_with_restarts(small_nozzle):
     pytest.importorskip("scipy")
     throat = load("study/throat.py")
     flows = study.Flows(FLOW, small_nozzle, {}, throat.SCHEDULE, throat.CRITERION, timeout=300)
-    found = study.compare(flows, throat.throat, throat.search(times=1.5, tolerance=5e-3))
+    found = study.compare(flows, throat.throat, study.reached(1.5, *throat.BOUNDS, tolerance=5e-3))
 
     assert found.values[0] == pytest.approx(found.values[1], abs=5e-3)
     for way in found.studies:
@@ -124,7 +124,7 @@ def test_the_throat_for_a_flow_rate_is_found_on_a_running_flow_and_with_restarts
     flow_rate = load("study/flow_rate.py")
     case = small_case("nozzle-pressure", "channel-5k")
     flows = study.Flows(FLOW, case, {}, flow_rate.SCHEDULE, flow_rate.CRITERION, timeout=300, quantity=study.RATE)
-    found = study.compare(flows, flow_rate.throat, flow_rate.search(part=0.8, tolerance=5e-3))
+    found = study.compare(flows, flow_rate.throat, study.reached(0.8, *flow_rate.BOUNDS, tolerance=5e-3))
 
     wanted = 0.8 * found.running.reference
     assert found.values[0] == pytest.approx(found.values[1], abs=1e-2)

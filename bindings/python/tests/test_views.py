@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import tombolo
 from conftest import box, ends, features_of
+from tombolo.state import State
 
 
 def test_what_is_announced_is_there_at_once(begin):
@@ -132,3 +133,14 @@ def test_tables_of_cycles_that_are_counted_anew_are_joined_by_row():
     for value in (1, 2):
         monitors._table("health")._append({"cycle": 9, "time": 9.0, "values": {"value": value}})
     assert monitors.to_pandas().loc[9, "health.value"].tolist() == [1, 2]
+
+
+def test_a_late_frame_of_a_removed_view_is_not_that_of_a_new_one():
+    state = State()
+    told = {"views": [{"name": "skin"}]}
+    state.take("hello", {"hello": dict(told)})
+    state.take("hello", {"hello": {"views": []}})
+    # It was on its way when the view was removed.
+    state.views["skin"] = "late"
+    state.take("hello", {"hello": dict(told)})
+    assert not state.views

@@ -11,14 +11,14 @@ const SHARE: f64 = 1e-3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rest {
     only_shows: bool,
-    /// Until this second on the clock of rank 0.
-    until: f64,
-    has_rested: bool,
+    /// The second on the clock of rank 0 that it rests until; none where it has not rested since somebody
+    /// looked.
+    until: Option<f64>,
 }
 
 impl Rest {
     pub(super) fn of(pipeline: &Pipeline) -> Self {
-        Self { only_shows: only_shows(pipeline), until: 0.0, has_rested: false }
+        Self { only_shows: only_shows(pipeline), until: None }
     }
 
     /// Whether nothing comes of the pipeline but what viewers see.
@@ -29,18 +29,17 @@ impl Rest {
     /// Whether it has rested for long enough.
     #[inline]
     pub(super) fn is_over(&self, now: &Now) -> bool {
-        now.seconds >= self.until
+        self.until.is_none_or(|until| now.seconds >= until)
     }
 
     /// Rests for so long that a run of these seconds is no more than its share of the time.
     pub(super) fn begin(&mut self, now: &Now, seconds: f64) {
-        self.until = now.seconds + seconds / SHARE;
-        self.has_rested = true;
+        self.until = Some(now.seconds + seconds / SHARE);
     }
 
     /// Whether this is the first run since somebody looks again.
     pub(super) fn ends(&mut self, now: &Now) -> bool {
-        !now.is_unwatched && std::mem::take(&mut self.has_rested)
+        !now.is_unwatched && self.until.take().is_some()
     }
 }
 

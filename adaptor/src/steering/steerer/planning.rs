@@ -100,7 +100,7 @@ impl Steerer {
                     (Some(worker), _) => worker.plan_here(&self.planner, &computing.asked),
                     (None, None) => lock(&self.planner).plan(&computing.asked),
                     (None, Some(together)) => {
-                        // What a run has done before, nobody takes back.
+                        // A replay repeats what was done, which cannot be cancelled any more.
                         let recorded = self.recorded.as_ref();
                         let is_repeated = recorded.is_some_and(|it| it.repeats(moment.cycle));
                         let id = (!is_repeated).then_some(&*computing.id);

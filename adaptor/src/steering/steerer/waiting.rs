@@ -32,7 +32,7 @@ impl Steerer {
         self.say_why(index + 1);
     }
 
-    /// Says what the order at a place of the queue waits for, where that has changed.
+    /// Says what the order at an index of the queue waits for, where that has changed.
     pub(crate) fn say_why(&mut self, index: usize) {
         let before = match index.checked_sub(1).and_then(|index| self.waiting.get(index)) {
             Some(before) => Some(&before.id),
@@ -51,9 +51,9 @@ impl Steerer {
         self.log.update(&task.id, |order| order.waits_for = Some(reason));
     }
 
-    /// Takes an order out of the queue, or one that does not move the mesh yet, and returns its place
-    /// in the queue; the error says that it moves the mesh already. `None` where it is neither.
-    /// Another order takes that place, or the one behind [says](Self::say_why) what it waits for now.
+    /// Takes an order out of the queue, or one that does not move the mesh yet, and returns its index
+    /// in the queue; the error says that it moves the mesh already. `None` where it is neither. The caller
+    /// puts another order there, or has the one behind [say](Self::say_why) what it waits for now.
     pub(crate) fn withdraw(&mut self, id: &str) -> Option<Result<usize, String>> {
         if let Some(index) = self.waiting.iter().position(|task| task.id == id) {
             self.waiting.remove(index);

@@ -311,7 +311,7 @@ class AsyncRun:
         """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes."""
         seconds(timeout)
         prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
-        question = await self._send(lambda client: client.forecast(prepared))
+        question = await self._send(lambda client: client.forecast(prepared), timeout)
         return await self._carry_out(self.run._foretold(question, timeout))
 
     async def hand_over(self, to: str, timeout: float = 60.0) -> None:

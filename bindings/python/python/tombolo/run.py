@@ -212,7 +212,7 @@ class Run(Watched):
         schedule, deform, guard : dict, optional
             As of `order`.
         timeout : float, optional
-            Seconds to wait for the answer, at most.
+            Seconds to wait for the wheel, and then for the answer, at most.
 
         Raises
         ------
@@ -228,7 +228,7 @@ class Run(Watched):
         """
         seconds(timeout)
         prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard))
-        self.drive()
+        self.drive(timeout)
         return self._reader.carry_out(self._foretold(self._reader.client.forecast(prepared), timeout))
 
     def _foretold(self, question: str, timeout: Optional[float]) -> Parts[Forecast]:
