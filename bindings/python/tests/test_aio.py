@@ -94,8 +94,8 @@ def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
     async def ask(aio):
         send, is_sent = aio._send, asyncio.Event()
 
-        async def send_and_tell(question):
-            sent = await send(question)
+        async def send_and_tell(*asked):
+            sent = await send(*asked)
             is_sent.set()
             return sent
 
