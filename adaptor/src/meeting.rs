@@ -1,7 +1,7 @@
 //! The meeting of all ranks at the beginning of a call.
 
 use tombolo_deform::communicator::{Communicator, RankError, Reduction, first_failure};
-use tombolo_pipelines::language::Command;
+use tombolo_pipelines::{language::Command, run::Audience};
 
 use crate::{
     error::ExecuteError,
@@ -10,7 +10,7 @@ use crate::{
 
 /// Finds out whether all ranks are at the same cycle and time and none has a fault, and whether
 /// rank 0 was called to look at something, and what it knows of the world outside. One reduction of
-/// six numbers; a message more where there is a fault. Collective.
+/// seven numbers; a message more where there is a fault. Collective.
 ///
 /// # Errors
 /// One of these, on all ranks: [`ExecuteError::Cycles`], [`ExecuteError::Times`], or
@@ -28,10 +28,12 @@ pub(crate) fn meet(
         told
     });
     let (cycle, time) = (moment.cycle, position_of(moment.time));
-    let called = if communicator.rank() == 0 { packed(called, outside) } else { 0 };
-    let mut said = [u64::from(told.is_some()), called, cycle, !cycle, time, !time];
+    let is_first = communicator.rank() == 0;
+    let called = if is_first { packed(called, outside) } else { 0 };
+    let audience = if is_first { outside.audience.to_bits() } else { 0 };
+    let mut said = [u64::from(told.is_some()), called, audience, cycle, !cycle, time, !time];
     communicator.reduce_integers(Reduction::Maximum, &mut said);
-    let [failing, called, highest, lowest, latest, earliest] = said;
+    let [failing, called, audience, highest, lowest, latest, earliest] = said;
     let (lowest, latest, earliest) = (!lowest, number_at(latest), number_at(!earliest));
     if failing > 0
         && let Some((rank, told)) = first_failure(communicator, 0, told)
@@ -47,14 +49,13 @@ pub(crate) fn meet(
     if latest > earliest {
         return Err(ExecuteError::Times { cycle, earliest, latest });
     }
-    Ok(unpacked(called))
+    Ok(unpacked(called, Audience::from_bits(audience)))
 }
 
-/// Bits of the count of viewers, behind one bit for the call and one that says whether anybody watches;
-/// the milliseconds have the others.
+/// Bits of the count of viewers, behind one bit for the call; the milliseconds have the others.
 const VIEWERS: u32 = 20;
 
-fn packed(called: bool, Outside { seconds, viewers, is_watched }: Outside) -> u64 {
+fn packed(called: bool, Outside { seconds, viewers, .. }: Outside) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -62,14 +63,14 @@ fn packed(called: bool, Outside { seconds, viewers, is_watched }: Outside) -> u6
     )]
     let milliseconds = (seconds * 1e3) as u64;
     let viewers = viewers.min((1 << VIEWERS) - 1);
-    milliseconds << (VIEWERS + 2) | viewers << 2 | u64::from(is_watched) << 1 | u64::from(called)
+    milliseconds << (VIEWERS + 1) | viewers << 1 | u64::from(called)
 }
 
-fn unpacked(packed: u64) -> (bool, Outside) {
-    #[expect(clippy::cast_precision_loss, reason = "milliseconds below 2^42")]
-    let seconds = (packed >> (VIEWERS + 2)) as f64 / 1e3;
-    let viewers = packed >> 2 & ((1 << VIEWERS) - 1);
-    (packed & 1 == 1, Outside { seconds, viewers, is_watched: packed & 2 == 2 })
+fn unpacked(packed: u64, audience: Audience) -> (bool, Outside) {
+    #[expect(clippy::cast_precision_loss, reason = "milliseconds below 2^43")]
+    let seconds = (packed >> (VIEWERS + 1)) as f64 / 1e3;
+    let viewers = packed >> 1 & ((1 << VIEWERS) - 1);
+    (packed & 1 == 1, Outside { seconds, viewers, audience })
 }
 
 const SIGN: u64 = 1 << 63;
@@ -142,13 +143,14 @@ mod tests {
     #[test]
     fn faults_are_the_same_everywhere() {
         let at = |cycle: u64| Moment { cycle, time: 0.0 };
+        let midplane = Audience::of(["midplane"]);
         let met = threads::run(3, |ranks| {
             let own = ranks.rank() as f64;
-            let is_watched = ranks.rank() == 0;
-            let outside = Outside { seconds: 12.5 + own, viewers: 3, is_watched };
+            let audience = if ranks.rank() == 0 { midplane } else { Audience::OF_ALL };
+            let outside = Outside { seconds: 12.5 + own, viewers: 3, audience };
             meet(&ranks, at(4), None, ranks.rank() == 0, outside)
         });
-        let of_first = (true, Outside { seconds: 12.5, viewers: 3, is_watched: true });
+        let of_first = (true, Outside { seconds: 12.5, viewers: 3, audience: midplane });
         assert!(met.into_iter().all(|met| met.is_ok_and(|met| met == of_first)));
         let said = threads::run(3, |ranks| {
             let fault = (ranks.rank() > 0).then_some(ExecuteError::NoChannel { cycle: 4 });

@@ -14,7 +14,7 @@ use tombolo_pipelines::{
     encode::Encoder,
     extract::{Channel, Snapshot},
     language::{Command, Config, ErrorBound, LogLevel, Monitor, Pipeline, Stage},
-    run::{Cost, Encoding, Frame, History, MonitorValues, Output, Replacement, Runner},
+    run::{Audience, Cost, Encoding, Frame, History, MonitorValues, Output, Replacement, Runner},
 };
 use tracing::{error, info, warn};
 
@@ -262,18 +262,18 @@ impl Pipelines {
     /// Tells what goes on outside, alike on all ranks: it counts from the next step on.
     pub(crate) fn tell(&mut self, outside: Outside) {
         self.runner.tell(outside.seconds, outside.viewers);
-        self.runner.set_watched(outside.is_watched);
+        self.runner.set_audience(outside.audience);
     }
 
-    /// Says whether anybody looks at what is shown, alike on all ranks.
-    pub(crate) fn set_watched(&mut self, is_watched: bool) {
-        self.runner.set_watched(is_watched);
+    /// Says which views somebody looks at, alike on all ranks.
+    pub(crate) fn set_audience(&mut self, audience: Audience) {
+        self.runner.set_audience(audience);
     }
 
-    /// Whether anybody looks at what is shown, as was said last.
+    /// The views that somebody looks at, as was said last.
     #[inline]
-    pub(crate) fn is_watched(&self) -> bool {
-        self.runner.is_watched()
+    pub(crate) fn audience(&self) -> Audience {
+        self.runner.audience()
     }
 
     /// Says that pipelines could run last at this cycle, where they cannot at every step.

@@ -1,5 +1,7 @@
 //! The steps of a solver.
 
+use tombolo_pipelines::run::Audience;
+
 /// A step that the solver is about to take, from `time` to `time + time_step`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
@@ -26,8 +28,8 @@ pub(crate) struct Outside {
     pub(crate) seconds: f64,
     /// How many viewers have come so far.
     pub(crate) viewers: u64,
-    /// Whether anybody looks at what is shown, a recording too.
-    pub(crate) is_watched: bool,
+    /// The views that somebody looks at; a recording looks at all.
+    pub(crate) audience: Audience,
 }
 
 /// A cycle and its simulated time.

@@ -265,6 +265,51 @@ fn frames_come_decoded_to_those_who_ask_and_hardly_to_others() {
 }
 
 #[test]
+fn the_views_that_were_chosen_are_those_that_come_also_after_a_lost_connection() {
+    let run = Run::new(
+        r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+            {"name": "boundary", "stages": [{"surface": {}}, {"stream": {}}]},
+            {"name": "middle", "stages": [
+                {"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}]}"#,
+    );
+    let proxy = Proxy::to(run.address);
+    let options = Options { views: true, ..quick() };
+    let client = Client::connect(&run.over(proxy.port), &options).expect("connected");
+    let next = |client: &Client| {
+        until(client, "frame", |told| match &told.event {
+            Event::Frame(frame) => Some((frame.view.clone(), frame.cycle)),
+            _ => None,
+        })
+    };
+    for view in ["middle", "boundary"] {
+        client.choose_views(Some([view.to_owned()].into()));
+        // Frames that were on their way come first.
+        while next(&client).0 != view {}
+        let (_, from) = next(&client);
+        client.wait_for_status(PATIENCE, |status| status.cycle > from + 20).expect("steps");
+        while next(&client).1 < from + 20 {}
+        assert_eq!(next(&client).0, view);
+    }
+    proxy.drop_all();
+    until(&client, "another connection", |told| {
+        matches!(told.event, Event::Hello(_)).then_some(())
+    });
+    let from = client.status().expect("told").cycle;
+    let mut of_other = 0;
+    loop {
+        let (view, cycle) = next(&client);
+        of_other += usize::from(view != "boundary");
+        if cycle > from + 50 {
+            break;
+        }
+    }
+    // What is sent until the run has heard it, two at most, and what it had waited with.
+    assert!(of_other <= 3, "{of_other} frames of a view that was not chosen");
+    drop(client);
+    run.end();
+}
+
+#[test]
 fn a_lost_connection_is_made_again_and_an_order_is_given_once() {
     let run = Run::new(LINK_TO_ALL);
     let proxy = Proxy::to(run.address);

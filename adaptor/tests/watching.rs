@@ -63,6 +63,73 @@ fn a_view_rests_while_nobody_watches_and_is_there_for_whoever_comes() {
     assert!(report.pipelines[0].runs < rested + 210, "{report:?}");
 }
 
+/// Reads until a frame of a cycle comes; all of it and of later ones are of one view.
+fn see_of(viewer: &mut Viewer, view: &str, cycle: u64) {
+    let begun = Instant::now();
+    loop {
+        let frames = viewer.decoded();
+        let other = frames.iter().find(|frame| frame.view != view && frame.cycle >= cycle);
+        let other = other.map(|frame| (&frame.view, frame.cycle));
+        assert!(other.is_none(), "looking at {view}, {cycle}: {other:?}");
+        if frames.iter().any(|frame| frame.cycle == cycle) {
+            return;
+        }
+        assert!(begun.elapsed() < PATIENCE, "no frame of cycle {cycle} came");
+        viewer.look_for("nothing", Duration::from_millis(10), |_| true);
+    }
+}
+
+/// Chooses views, and returns once the run has heard it.
+fn choose(viewer: &mut Viewer, views: &Value, name: &str) {
+    viewer.send(&json!({"views": views}));
+    viewer.send(&json!({"name": {"name": name}}));
+    viewer.wait_for("people", |people| people.to_string().contains(name));
+}
+
+#[test]
+fn a_view_at_which_nobody_looks_rests_and_is_not_sent() {
+    let mut solver = Solver::with_config(
+        r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+            {"name": "boundary", "stages": [{"surface": {}}, {"stream": {}}]},
+            {"name": "middle", "stages": [
+                {"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1, 0, 0]}}, {"stream": {}}]}]}"#,
+    );
+    let mut viewer = Viewer::connect(&solver.adaptor);
+    viewer.hello();
+    // Also one that there is not.
+    choose(&mut viewer, &json!({"names": ["middle", "nothing"]}), "Anna");
+    for cycle in 0..5 {
+        solver.step();
+        see_of(&mut viewer, "middle", cycle);
+    }
+    solver.steps(400);
+    see_of(&mut viewer, "middle", 404);
+    // One who looks at nothing wakes none.
+    let mut other = Viewer::connect(&solver.adaptor);
+    other.hello();
+    choose(&mut other, &json!({"names": []}), "Zoe");
+    other.decoded();
+    choose(&mut viewer, &json!({"names": ["boundary"]}), "Berta");
+    for cycle in 405..410 {
+        solver.step();
+        see_of(&mut viewer, "boundary", cycle);
+    }
+    choose(&mut viewer, &json!({}), "Clara");
+    solver.step();
+    let (begun, mut shown) = (Instant::now(), std::collections::BTreeSet::new());
+    while shown.len() < 2 {
+        assert!(begun.elapsed() < PATIENCE, "both views are chosen, and {shown:?} came");
+        viewer.look_for("nothing", Duration::from_millis(10), |_| true);
+        let newest = viewer.decoded().into_iter().filter(|frame| frame.cycle == 410);
+        shown.extend(newest.map(|frame| frame.view));
+    }
+    other.look_for("nothing", Duration::from_millis(100), |_| true);
+    assert!(other.decoded().is_empty());
+    let runs = solver.finish().pipelines.into_iter().map(|pipeline| pipeline.runs);
+    let [boundary, middle] = runs.collect::<Vec<_>>()[..] else { panic!("two pipelines") };
+    assert!((6..200).contains(&boundary) && middle >= 406, "{boundary} and {middle} runs");
+}
+
 #[test]
 fn a_recording_misses_nothing_though_nobody_watches() {
     let output = tempfile::tempdir().unwrap();

@@ -212,6 +212,7 @@ pub(crate) fn playback_seeds() -> Vec<Vec<u8>> {
         json!({"play": {"paused": false, "speed": 0.5}}),
         json!({"here": {}}),
         json!({"drive": {}}),
+        json!({"views": {"names": ["boundary"]}}),
         json!({"id": "b", "order": {"undo": 1}}),
     ];
     seeds.map(|seed| seed.to_string().into_bytes()).to_vec()

@@ -203,6 +203,8 @@ fn messages(seeds: &Seeds) -> impl Iterator<Item = Vec<u8>> {
                           "parallel": false, "parallel_scale": 1, "view_angle": 30}}),
         json!({"note": {"text": "here\nand there", "at": [1, 2.5, -3], "cycle": 3}}),
         json!({"remove_note": {"number": 1}}),
+        json!({"views": {"names": ["boundary"]}}),
+        json!({"views": {}}),
         json!({"id": "p", "pipelines": {"remove": ["boundary"]}}),
     ];
     let documents = seeds.documents.iter().filter_map(|text| serde_json::from_str(text).ok());

@@ -9,7 +9,7 @@ use tombolo_deform::mesh::MeshView;
 use tombolo_deform::shapes::box_of_tets;
 use tombolo_pipelines::extract::{Channel, FieldView, Snapshot};
 use tombolo_pipelines::language::{Command, Config, Existing, check_parameters, parse};
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::{Audience, Output, Runner};
 
 fn config(pipelines: &str) -> Config {
     let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
@@ -227,7 +227,10 @@ fn views_rest_while_nobody_looks() {
         assert!(runner.listens());
         let ran_at = |cycle: u64| {
             runner.tell(10.0 * cycle as f64, 0);
-            runner.set_watched(!(4..19).contains(&cycle));
+            // Somebody who looks at another view wakes none of these.
+            let is_away = (4..19).contains(&cycle);
+            let looks_at: &[&str] = if is_away { &["other"] } else { &["view", "limited"] };
+            runner.set_audience(Audience::of(looks_at.iter().copied()));
             let before: Vec<u64> = runner.costs().map(|(_, cost)| cost.runs).collect();
             step_of(rank, &mut runner, cycle, 0.0);
             let ran = runner.costs().zip(before).filter(|((_, cost), runs)| cost.runs > *runs);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use tombolo_pipelines::{extract::Channel, language::Command};
+use tombolo_pipelines::{extract::Channel, language::Command, run::Audience};
 
 use super::{Adaptor, SteeredMesh};
 use crate::step::{Moment, Outside};
@@ -37,19 +37,22 @@ impl Adaptor {
         Outside {
             seconds: entered.duration_since(self.timing.begun).as_secs_f64(),
             viewers: hub.map_or(0, |hub| hub.arrivals()),
-            is_watched: is_waited_for || hub.is_some_and(|hub| hub.is_watched()),
+            audience: match hub {
+                _ if is_waited_for => Audience::OF_ALL,
+                Some(hub) => hub.audience(),
+                None => Audience::NOBODY,
+            },
         }
     }
 
-    /// Wakes the views that rest, once somebody watches. Where the solver was told that nothing looks at
+    /// Wakes the views that rest, once somebody looks at them. Where the solver was told that nothing looks at
     /// this step, the next one wakes them. Returns whether they are awake from now on. Collective.
     #[inline]
     pub(super) fn notice_viewers(&mut self, outside: Outside) -> bool {
-        let wakes = outside.is_watched
-            && !self.pipelines.is_watched()
+        let wakes = !self.pipelines.audience().includes(outside.audience)
             && !self.communicator.any(*self.is_spared.get_mut());
         if wakes {
-            self.pipelines.set_watched(true);
+            self.pipelines.set_audience(outside.audience);
         }
         wakes
     }
@@ -57,10 +60,12 @@ impl Adaptor {
     /// Makes the views that rest before the run waits, so that whoever comes meanwhile sees it as it is.
     /// Makes none where the solver was told that nothing looks at this step. Collective.
     pub(super) fn show_before_waiting(&mut self, moment: Moment, channels: &[Channel<'_>]) {
-        if self.pipelines.is_watched() || self.communicator.any(*self.is_spared.get_mut()) {
+        if self.pipelines.audience() == Audience::OF_ALL
+            || self.communicator.any(*self.is_spared.get_mut())
+        {
             return;
         }
-        self.pipelines.set_watched(true);
+        self.pipelines.set_audience(Audience::OF_ALL);
         if self.pipelines.is_due(moment) {
             let commands = self.run_pipelines(moment, channels);
             self.accept_from_pipelines(commands, moment);

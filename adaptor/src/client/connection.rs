@@ -4,6 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use axum::http::{HeaderValue, header};
 use futures_util::{SinkExt, StreamExt};
+use serde_json::json;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_tungstenite::{
     WebSocketStream, client_async_with_config,
@@ -208,18 +209,24 @@ async fn first_text(socket: &mut Socket) -> Result<String, Option<CloseFrame>> {
 async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Over {
     let mut decoder = Decoder::new();
     let (mut frames, mut acknowledged) = (0_u64, 0_u64);
+    // The views that the run sends: all, until it is told.
+    let mut chosen = None;
     let mut regain = tokio::time::interval(REGAIN);
     let mut heard = Instant::now();
     loop {
         // One that asks for no views acknowledges the first frame alone: no more than two of each
-        // view are on their way to it then.
-        let (unsent, taken, closing) =
-            shared.with(|state| (state.unsent(), state.taken, state.closing));
+        // view are on their way to it, before the run has heard that.
+        let (unsent, taken, closing, wanted) =
+            shared.with(|state| (state.unsent(), state.taken, state.closing, state.chosen.clone()));
         let count = if options.views { taken.clamp(1, frames.max(1)) } else { 1 };
         let mut messages: Vec<Message> = unsent.into_iter().map(Message::text).collect();
         if frames > 0 && count > acknowledged {
             acknowledged = count;
             messages.push(Message::binary(count.to_le_bytes().to_vec()));
+        }
+        if wanted != chosen {
+            messages.push(Message::text(json!({"views": {"names": wanted}}).to_string()));
+            chosen = wanted;
         }
         for message in messages {
             match timeout(WRITE, socket.send(message)).await {

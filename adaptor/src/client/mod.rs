@@ -60,7 +60,8 @@
 //!   then the oldest of all; of `hello` and `status` only the newest waits. [`Client::missed`] counts.
 //! - What comes from the network is no more than it may be, and never a panic: what is not understood is
 //!   passed on as [`Event::Unknown`], and what is no message at all ends the connection.
-//! - One that asks for no [views](Options::views) is sent two frames of each view at most.
+//! - One that asks for no [views](Options::views) is sent two frames of each view at most, and none
+//!   once the run has heard that: views at which nobody looks rest, and cost the solver nothing.
 //!
 //! # What it does not
 //!
@@ -75,6 +76,7 @@ mod state;
 mod wheel;
 
 use std::{
+    collections::BTreeSet,
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
@@ -189,6 +191,9 @@ impl Client {
             .build()
             .map_err(|error| system(error.to_string()))?;
         let shared = Arc::new(Shared::default());
+        if !options.views {
+            shared.with(|state| state.chosen = Some(BTreeSet::new()));
+        }
         let answer = options.answer;
         let (on_thread, of, options) = (Arc::clone(&shared), link.clone(), options.clone());
         let serve = move || {
@@ -338,6 +343,14 @@ impl Client {
     /// As of [`Client::send`].
     pub fn set(&self, name: &str, value: f64) -> Result<String, ClientError> {
         self.send(&Command::Parameter(Parameter { name: name.into(), value }))
+    }
+
+    /// Chooses the views whose frames are sent, by name; all of them where that is `None`, as they are at
+    /// first. A name that no view has yet counts once one has it. Views at which nobody looks rest. A
+    /// client that asks for no [views](Options::views) hands no frames out whatever it chooses.
+    pub fn choose_views(&self, names: Option<BTreeSet<String>>) {
+        self.shared.with(|state| state.chosen = names);
+        self.shared.wake.notify_one();
     }
 
     /// A link that opens one browser, once, to watch or to drive: the address of this client's own

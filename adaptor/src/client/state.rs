@@ -2,7 +2,7 @@
 //! has answered.
 
 use std::{
-    collections::{HashMap, VecDeque},
+    collections::{BTreeSet, HashMap, VecDeque},
     sync::{Arc, Condvar, Mutex},
     time::{Duration, Instant},
 };
@@ -63,6 +63,8 @@ pub(super) struct State {
     /// The questions that somebody waits for, and their answers: whoever reads events meanwhile does
     /// not take these.
     pub(super) asked: HashMap<String, Option<Event>>,
+    /// The names of the views whose frames are wanted; all where that is `None`.
+    pub(super) chosen: Option<BTreeSet<String>>,
     /// Why nothing comes any more.
     pub(super) failure: Option<ClientError>,
     pub(super) closing: bool,

@@ -6,17 +6,21 @@
 //! texts.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{
         Arc, Condvar, Mutex,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicU64, Ordering},
     },
     time::{Duration, Instant},
 };
 
 use serde_json::{Map, Value, json};
 use tombolo_deform::edit::Edit;
-use tombolo_pipelines::{encode::Encoded, language::Pipeline, run::Cost};
+use tombolo_pipelines::{
+    encode::Encoded,
+    language::Pipeline,
+    run::{Audience, Cost},
+};
 
 use super::{
     ReferenceSurface, StreamCounts,
@@ -151,8 +155,8 @@ pub(crate) struct Hub {
     pub(crate) clock: Arc<Clock>,
     counters: Counters,
     arrivals: AtomicU64,
-    /// Whether anybody is told what happens.
-    is_watched: AtomicBool,
+    /// The bits of the [`Audience`].
+    audience: AtomicU64,
     /// The number of the run, where one is shown.
     run: Option<Arc<str>>,
 }
@@ -253,15 +257,17 @@ impl Hub {
         self.arrivals.load(Ordering::Relaxed)
     }
 
-    /// Whether anybody looks: viewers, or a recording.
+    /// The views that viewers look at; a recording looks at all.
     #[inline]
-    pub(crate) fn is_watched(&self) -> bool {
-        self.is_watched.load(Ordering::Relaxed)
+    pub(crate) fn audience(&self) -> Audience {
+        Audience::from_bits(self.audience.load(Ordering::Relaxed))
     }
 
-    /// Notes whether anybody looks, where that may have changed.
+    /// Notes which views somebody looks at, where that may have changed.
     pub(super) fn note_audience(&self, state: &HubState) {
-        self.is_watched.store(state.has_audience(), Ordering::Relaxed);
+        let of_each = state.audience().map(|client| client.audience());
+        let audience = of_each.fold(Audience::NOBODY, Audience::with);
+        self.audience.store(audience.to_bits(), Ordering::Relaxed);
     }
 
     /// Returns once a viewer is connected, or the run is to stop.
@@ -300,7 +306,7 @@ impl Hub {
     /// dropped.
     pub(crate) fn frame(&self, view: usize, name: &Arc<str>, encode: Encode) {
         let mut state = lock(&self.state);
-        let watched = state.has_audience();
+        let watched = self.audience().includes(Audience::of([&**name]));
         let named = || View { name: Arc::clone(name), ..View::default() };
         let known = state.views.entry(view).or_insert_with(named);
         if known.waiting.replace(encode).is_some() && watched {
@@ -363,8 +369,11 @@ impl Hub {
                 }
                 let HubState { views, clients, observer, .. } = &mut *state;
                 let audience = || clients.values().chain(&*observer);
-                let mut views = views.iter_mut().filter(|_| audience().next().is_some());
-                let waiting = views.find_map(|(&number, view)| view.due(number, audience()));
+                let waiting = views.iter_mut().find_map(|(&number, view)| {
+                    let name = Arc::clone(&view.name);
+                    let mut looking = audience().filter(|client| client.looks_at(&name)).peekable();
+                    looking.peek().is_some().then(|| view.due(number, looking)).flatten()
+                });
                 match waiting {
                     Some(found) => break found,
                     None => state = wait(&self.work, state),
@@ -459,6 +468,18 @@ impl Hub {
     /// Whether anybody is connected.
     pub(crate) fn has_viewers(&self) -> bool {
         !lock(&self.state).clients.is_empty()
+    }
+
+    /// Takes note of the views that a viewer looks at; all of them where that is `None`.
+    pub(super) fn choose_views(&self, client: u64, chosen: Option<BTreeSet<String>>) {
+        let state = lock(&self.state);
+        if let Some(client) = state.clients.get(&client) {
+            let known = state.views.iter().map(|(&view, known)| (view, &*known.name));
+            client.choose(chosen, known);
+        }
+        self.note_audience(&state);
+        drop(state);
+        self.work.notify_one();
     }
 
     /// Has the encoder make a key frame of a view at a level, of its newest extract.

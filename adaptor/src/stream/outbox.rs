@@ -3,14 +3,14 @@
 //! What is kept for a viewer is bounded: a few frames of each view, short queues of texts.
 
 use std::{
-    collections::{BTreeMap, VecDeque},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     sync::{Arc, Mutex},
 };
 
 use axum::body::Bytes;
 use serde_json::json;
 use tokio::sync::Notify;
-use tombolo_pipelines::encode::Encoded;
+use tombolo_pipelines::{encode::Encoded, run::Audience};
 
 use super::{
     credentials::Access,
@@ -135,6 +135,8 @@ struct Outbox {
     hello: bool,
     has_been_greeted: bool,
     views: BTreeMap<usize, Unread>,
+    /// The names of the views that the viewer looks at; all where it has chosen none.
+    chosen: Option<BTreeSet<String>>,
     /// The pace at which a view begins.
     pace: Pace,
     /// The view that was served last: they take turns.
@@ -153,6 +155,10 @@ struct Outbox {
 }
 
 impl Outbox {
+    fn looks_at(&self, name: &str) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| chosen.contains(name))
+    }
+
     /// The next frame, or a view whose next key frame is to be asked for.
     fn frame(&mut self) -> Option<Message> {
         let waits = |unread: &Unread| {
@@ -349,6 +355,9 @@ impl Client {
     pub(super) fn frame(&self, view: usize, name: &Arc<str>, frame: &Arc<Frame>) -> usize {
         let mut missed = 0;
         self.put(|outbox| {
+            if !outbox.looks_at(name) {
+                return;
+            }
             let begun = || Unread { pace: outbox.pace.clone(), ..Unread::default() };
             let unread = outbox.views.entry(view).or_insert_with(begun);
             let is_changed;
@@ -361,6 +370,39 @@ impl Client {
             }
         });
         missed
+    }
+
+    /// Chooses the views that the viewer looks at, all of them where that is `None`. It needs a key frame
+    /// of each that it did not look at before; `known` are the views there are.
+    pub(super) fn choose<'a>(
+        &self,
+        chosen: Option<BTreeSet<String>>,
+        known: impl Iterator<Item = (usize, &'a str)>,
+    ) {
+        self.put(|outbox| {
+            outbox.chosen = chosen;
+            for (view, name) in known {
+                if !outbox.looks_at(name) {
+                    outbox.views.remove(&view);
+                } else if !outbox.views.contains_key(&view) {
+                    let pace = outbox.pace.clone();
+                    let behind = Unread { is_behind: true, pace, ..Unread::default() };
+                    outbox.views.insert(view, behind);
+                }
+            }
+        });
+    }
+
+    /// Whether the viewer looks at the view of this name.
+    pub(super) fn looks_at(&self, name: &str) -> bool {
+        lock(&self.outbox).looks_at(name)
+    }
+
+    /// The views that the viewer looks at.
+    pub(super) fn audience(&self) -> Audience {
+        let outbox = lock(&self.outbox);
+        let names = outbox.chosen.as_ref();
+        names.map_or(Audience::OF_ALL, |names| Audience::of(names.iter().map(String::as_str)))
     }
 
     /// How exact the frames of a view are for it.

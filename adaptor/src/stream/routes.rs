@@ -34,6 +34,9 @@ use super::{
 const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
 /// The same for a client that can never command: nothing that it may say is near as long.
 const WATCHED_SIZE: usize = 1 << 16;
+/// Bytes of a viewer that are read at once. They are cleared before each read, and most messages are a
+/// few bytes: more would take the solver's data out of the caches.
+const READ_BUFFER: usize = 1 << 12;
 
 /// All routes, behind the gate.
 pub(super) fn router(shared: Shared) -> Router {
@@ -69,7 +72,8 @@ async fn upgrade(
         Access::Drive if shared.playback.is_none() => MESSAGE_SIZE,
         _ => WATCHED_SIZE,
     };
-    upgrade.max_message_size(most).max_frame_size(most).on_upgrade(move |mut socket| async move {
+    let upgrade = upgrade.max_message_size(most).max_frame_size(most);
+    upgrade.read_buffer_size(READ_BUFFER).on_upgrade(move |mut socket| async move {
         connection.upgraded();
         if let Some(shown) = &shared.playback {
             let shown = Arc::clone(shown);

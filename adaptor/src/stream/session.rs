@@ -226,7 +226,7 @@ fn is_too_long(error: axum::Error) -> bool {
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
 /// "forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
-/// "note" | "remove_note": ...}`.
+/// "note" | "remove_note" | "views": ...}`.
 fn receive(
     text: &str,
     seat: &Seat<'_>,
@@ -251,7 +251,9 @@ fn receive(
     }
     let (id, message) = parse_message(text);
     // A page says these by itself, also where nobody is there.
-    if !matches!(message, Ok(Said::Together(Together::Camera(_) | Together::Name { .. }))) {
+    let is_by_itself =
+        |it: &_| matches!(it, Together::Camera(_) | Together::Name { .. } | Together::Views { .. });
+    if !matches!(&message, Ok(Said::Together(together)) if is_by_itself(together)) {
         hub.heard(client.id);
     }
     let answered = match message {
@@ -314,6 +316,7 @@ fn take(
         Together::Name { name } => hub.call(client.id, name.trim()),
         Together::Follow { on } => hub.follow(client.id, on),
         Together::Camera(camera) => hub.show_camera(client.id, camera)?,
+        Together::Views { names } => hub.choose_views(client.id, names),
         Together::Note(note) => {
             may_drive()?;
             commands.note(JournalNote::Note(hub.pin(client.id, note)?));

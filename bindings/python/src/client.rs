@@ -1,5 +1,6 @@
 //! A client of a run, on which the class `tombolo.Run` rests.
 
+use std::collections::BTreeSet;
 use std::mem::ManuallyDrop;
 use std::num::NonZeroU32;
 use std::time::Duration;
@@ -255,6 +256,11 @@ impl Client {
             )));
         }
         self.give(Command::Parameter(language::Parameter { name, value }))
+    }
+
+    /// Chooses the views whose frames are sent; all of them for None.
+    fn choose_views(&self, names: Option<BTreeSet<String>>) {
+        self.client.choose_views(names);
     }
 
     /// Changes the pipelines; returns the id of the change.

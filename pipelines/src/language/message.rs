@@ -98,7 +98,7 @@ fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
     match key {
         "forecast" => document.valid().map(Message::Question),
         "drive" | "hand_over" | "kick" | "here" => document.value().map(Message::Wheel),
-        "link" | "name" | "follow" | "camera" | "note" | "remove_note" => {
+        "link" | "name" | "follow" | "camera" | "note" | "remove_note" | "views" => {
             document.valid().map(Message::Together)
         }
         _ => document.valid().map(Message::Command),

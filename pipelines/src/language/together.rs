@@ -1,11 +1,13 @@
 //! Messages of viewers that are about the viewers themselves: links for others, names, the camera of
 //! the one that drives, notes. Nothing of the run changes by them.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::Problem;
 use super::parse::Validate;
-use crate::limits::{Exceeded, Limit, NOTE, NOTES, VIEWER_NAME};
+use crate::limits::{Exceeded, Limit, NAME, NOTE, NOTES, VIEWER_NAME, VIEWS};
 
 /// A message about the viewers themselves.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -34,6 +36,12 @@ pub enum Together {
     RemoveNote {
         /// The number of the note.
         number: u64,
+    },
+    /// Chooses the views whose frames the viewer is sent.
+    Views {
+        /// Their names; all views where this is left out. A name that no view has yet counts once one
+        /// has it.
+        names: Option<BTreeSet<String>>,
     },
 }
 
@@ -114,6 +122,8 @@ impl Validate for Together {
                 camera.validate().map_err(|problem| problem.within("camera"))
             }
             Together::Note(note) => note.validate().map_err(|problem| problem.within("note")),
+            Together::Views { names } => check_names(names.iter().flatten())
+                .map_err(|exceeded| Problem::from(exceeded).within("names").within("views")),
         }
     }
 }
@@ -148,6 +158,12 @@ impl Validate for NewNote {
         }
         check_text(text, NOTE, |c| c == '\n').map_err(|problem| problem.within("text"))
     }
+}
+
+/// Whether names of views are few and short enough.
+fn check_names<'a>(mut names: impl Iterator<Item = &'a String> + Clone) -> Result<(), Exceeded> {
+    VIEWS.check(names.clone().count())?;
+    names.try_for_each(|name| NAME.check(name.chars().count()))
 }
 
 /// Whether a text that others see is short enough and holds nothing that is not seen.
@@ -216,6 +232,27 @@ mod tests {
         }
         let long = format!("\"{}\"", "é".repeat(501));
         assert!(note(&long, "[0, 0, 0]").unwrap_err().contains("found 501 characters"));
+    }
+
+    #[test]
+    fn views_are_chosen_by_name() {
+        let chosen = |names: &[&str]| {
+            let names = names.iter().map(|name| (*name).to_owned()).collect();
+            Together::Views { names: Some(names) }
+        };
+        assert_eq!(read(r#"{"views": {"names": ["b", "a", "b"]}}"#).unwrap(), chosen(&["a", "b"]));
+        assert_eq!(read(r#"{"views": {"names": []}}"#).unwrap(), chosen(&[]));
+        assert_eq!(read(r#"{"views": {}}"#).unwrap(), Together::Views { names: None });
+        let many: Vec<String> = (0..257).map(|number| number.to_string()).collect();
+        for (names, reason) in [
+            (serde_json::json!(many), "views.names: found 257 pipelines that stream"),
+            (serde_json::json!(["x".repeat(201)]), "views.names: found 201 characters"),
+            (serde_json::json!("a"), "views.names"),
+        ] {
+            let error = read(&serde_json::json!({"views": {"names": names}}).to_string());
+            let error = error.unwrap_err();
+            assert!(error.contains(reason), "{error}");
+        }
     }
 
     #[test]

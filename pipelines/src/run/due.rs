@@ -2,6 +2,7 @@
 
 use tombolo_deform::communicator::{Garbled, Reader, Writer};
 
+use super::audience::Audience;
 use crate::language::{Cadence, Due};
 
 /// How much of an interval a step may come too early: time steps add up with rounding.
@@ -16,8 +17,8 @@ pub(super) struct Now {
     pub(super) seconds: f64,
     /// How many viewers have come so far.
     pub(super) viewers: u64,
-    /// Whether nobody looks at what is shown.
-    pub(super) is_unwatched: bool,
+    /// The views that somebody looks at.
+    pub(super) audience: Audience,
     /// The last cycle at which pipelines could run, where they cannot at every step.
     pub(super) met: Option<u64>,
 }

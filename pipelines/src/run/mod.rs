@@ -1,5 +1,6 @@
 //! Pipelines at work: which are due, and what comes of them.
 
+mod audience;
 mod cost;
 mod due;
 mod history;
@@ -25,6 +26,7 @@ use history::Board;
 use pipeline::Prepared;
 use tombolo_deform::communicator::{Communicator, Solo, agree};
 
+pub use audience::Audience;
 pub use cost::Cost;
 pub use history::{History, Measured};
 #[cfg(feature = "files")]
@@ -112,18 +114,18 @@ impl Runner {
         (self.outside.seconds, self.outside.viewers) = (seconds, viewers);
     }
 
-    /// Says whether anybody looks at what is shown; at first somebody does. While nobody does, a
-    /// pipeline of which nothing comes but a view runs so seldom that it takes no more than a
-    /// thousandth of the time. Once somebody does it runs at the next step, where one of its times has
-    /// gone by. All ranks say the same, and [`tell`](Self::tell) the seconds.
-    pub fn set_watched(&mut self, is_watched: bool) {
-        self.outside.is_unwatched = !is_watched;
+    /// Says which views somebody looks at; at first somebody looks at all. While nobody does, a pipeline
+    /// of which nothing comes but a view runs so seldom that it takes no more than a thousandth of the
+    /// time. Once somebody does it runs at the next step, where one of its times has gone by. All ranks
+    /// say the same, and [`tell`](Self::tell) the seconds.
+    pub fn set_audience(&mut self, audience: Audience) {
+        self.outside.audience = audience;
     }
 
-    /// Whether anybody looks at what is shown, as was said last.
+    /// The views that somebody looks at, as was said last.
     #[must_use]
-    pub fn is_watched(&self) -> bool {
-        !self.outside.is_unwatched
+    pub fn audience(&self) -> Audience {
+        self.outside.audience
     }
 
     /// Says that pipelines could run last at this cycle, for ranks that do not come together at

@@ -1,6 +1,6 @@
 //! Views rest while nobody looks.
 
-use super::due::Now;
+use super::{audience::Audience, due::Now};
 use crate::language::{Action, Due, Pipeline, Stage};
 
 /// The most that a view takes of the time while nobody looks. It is taken now and then all the same, so
@@ -11,6 +11,8 @@ const SHARE: f64 = 1e-3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rest {
     only_shows: bool,
+    /// One who looks at its view.
+    looks: Audience,
     /// The second on the clock of rank 0 that it rests until; none where it has not rested since somebody
     /// looked.
     until: Option<f64>,
@@ -18,12 +20,22 @@ pub(super) struct Rest {
 
 impl Rest {
     pub(super) fn of(pipeline: &Pipeline) -> Self {
-        Self { only_shows: only_shows(pipeline), until: None }
+        Self {
+            only_shows: only_shows(pipeline),
+            looks: Audience::of([pipeline.name.as_str()]),
+            until: None,
+        }
     }
 
     /// Whether nothing comes of the pipeline but what viewers see.
     pub(super) fn only_shows(&self) -> bool {
         self.only_shows
+    }
+
+    /// Whether somebody looks at its view.
+    #[inline]
+    pub(super) fn is_watched(&self, now: &Now) -> bool {
+        now.audience.includes(self.looks)
     }
 
     /// Whether it has rested for long enough.
@@ -39,7 +51,7 @@ impl Rest {
 
     /// Whether this is the first run since somebody looks again.
     pub(super) fn ends(&mut self, now: &Now) -> bool {
-        !now.is_unwatched && self.until.take().is_some()
+        self.is_watched(now) && self.until.take().is_some()
     }
 }
 

@@ -72,7 +72,7 @@ impl Prepared {
         self.cost.runs += 1;
         self.cost.seconds += seconds;
         self.cost.last_seconds = seconds;
-        let rests = now.is_unwatched && self.rest.only_shows();
+        let rests = self.rest.only_shows() && !self.rest.is_watched(now);
         if !rests && !self.thinning.is_limited() {
             return None;
         }

@@ -150,7 +150,7 @@ impl Prepared {
         self.is_chosen
             && match self.rest.only_shows() {
                 // What went by while it rested is made up for.
-                true if !now.is_unwatched => self.due.has_struck(now),
+                true if self.rest.is_watched(now) => self.due.has_struck(now),
                 true => self.due.is_due(now) && self.rest.is_over(now),
                 false => self.due.is_due(now),
             }
