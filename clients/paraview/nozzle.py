@@ -3,9 +3,9 @@
     flow --case examples/flow/cases/nozzle.json                       # prints its link, and writes it to a file
     pvpython clients/paraview/nozzle.py tombolo-7070.link
 
-The three orders are the paper's: at once, and in ten shapes; the last one is given as the displacement that two chains
-of edits add up to. Each makes the shape that its chain shows, whatever the run had before; its undo brings that back.
-With `--out` what is shown after each order is written as `shown-CYCLE.vtp`.
+The throat is pinched to half its height as in the paper: at once, and in ten shapes; the third order is the
+displacement that two chains of edits add up to. Each makes the shape that its chain shows, whatever the run had before;
+its undo brings that back. With `--out` what is shown after each order is written as `shown-CYCLE.vtp`.
 """
 
 import argparse
@@ -53,18 +53,11 @@ def rows(table):
     }
 
 
-def main():
-    """The program."""
-    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    arguments.add_argument("link")
-    arguments.add_argument("--view", default="surface")
-    arguments.add_argument("--cycles", type=int, default=200, help="how long it is watched, at least")
-    arguments.add_argument("--out", type=Path)
-    given = arguments.parse_args()
-
-    run = TomboloRun(Link=given.link, View=given.view)  # noqa: F821
+def steer(link, view, cycles, out, say):
+    """Gives and takes back the three orders; says what becomes of each, and writes what is shown into a folder."""
+    run = TomboloRun(Link=link, View=view)  # noqa: F821
     began = cycle(wait(run, lambda data: cycle(data) >= 0))
-    surface = TomboloSurface(Link=given.link)  # noqa: F821
+    surface = TomboloSurface(Link=link)  # noqa: F821
     wait(surface, lambda data: data.GetNumberOfPoints() > 0)
 
     def pinch(factor):
@@ -73,26 +66,37 @@ def main():
 
     def keep():
         shown = newest(run)
-        if given.out:
-            simple.SaveData(str(given.out / f"shown-{cycle(shown)}.vtp"), proxy=run)
+        if out:
+            simple.SaveData(str(out / f"shown-{cycle(shown)}.vtp"), proxy=run)
 
     both = TomboloCombineDisplacements(First=pinch(0.75), Second=pinch(0.75))  # noqa: F821
     for edits, steps in ((pinch(0.5), 1), (pinch(0.5), 10), (both, 10)):
-        order = TomboloOrder(Input=edits, Link=given.link, Steps=steps, Every=2)  # noqa: F821
+        order = TomboloOrder(Input=edits, Link=link, Steps=steps, Every=2)  # noqa: F821
         order.SMProxy.InvokeCommand("Forecast")
         told = rows(wait(order, lambda table: rows(table).get("forecast", "asked") != "asked"))
-        print("forecast:", told["forecast"], flush=True)
+        say(f"forecast: {told['forecast']}")
         order.SMProxy.InvokeCommand("Give")
         told = rows(wait(order, lambda table: rows(table).get("status", "").startswith(("applied", "rejected"))))
-        print("order:", told["status"], told.get("reason", ""), flush=True)
+        say(f"order: {told['status']} {told.get('reason', '')}")
         keep()
         order.SMProxy.InvokeCommand("Undo")
         wait(order, lambda table: rows(table).get("stack") == "0 edits")
         told = rows(wait(order, lambda table: rows(table).get("status", "").startswith("applied")))
-        print("undo:", told["status"], flush=True)
+        say(f"undo: {told['status']}")
         keep()
-    shown = wait(run, lambda data: cycle(data) >= began + given.cycles)
-    print(f"watched from cycle {began} to {cycle(shown)}")
+    shown = wait(run, lambda data: cycle(data) >= began + cycles)
+    say(f"watched from cycle {began} to {cycle(shown)}")
+
+
+def main():
+    """The program."""
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("link")
+    arguments.add_argument("--view", default="surface")
+    arguments.add_argument("--cycles", type=int, default=200, help="how long it is watched, at least")
+    arguments.add_argument("--out", type=Path)
+    given = arguments.parse_args()
+    steer(given.link, given.view, given.cycles, given.out, lambda text: print(text, flush=True))
 
 
 if __name__ == "__main__":

@@ -8,9 +8,10 @@ hide the package.
 
 Filters of edits are chained. Each adds its edit to the list that comes with the surface (the field data `edits`) and
 the array `displacement`, which the same kernel computes that moves the solver's mesh. Behind a displacement that no
-list of edits stands for, as that of two chains combined, the list begins with it.
+list of edits stands for, as that of two chains combined or of a Calculator, the list begins with it.
 """
 
+import hashlib
 import json
 import time
 
@@ -81,15 +82,16 @@ def _input(name="Input", port=0):
     )
 
 
-_FEATURES = (
+_NAMED = (
     _input()
     + _text("Features", "The features that are moved, parted by commas.")
     + _text("Fixed", "The features that are held, parted by commas.")
-    + _count(
-        "HarmonicOrder", "How smoothly the rest follows: 1 with a kink, 2 with a slope, 3 with a curvature.", 2, 1, 3
-    )
 )
-_EXPECTED = "the link that the run has printed, or its file tombolo-PORT.link"
+_FEATURES = _NAMED + _count(
+    "HarmonicOrder", "How smoothly the rest follows: 1 with a kink, 2 with a slope, 3 with a curvature.", 2, 1, 3
+)
+_EXPECTED = "the run's file tombolo-PORT.link, or a link out of it"
+_MENU = '<ShowInMenu category="Tombolo"/>'
 _LINK = _text("Link", f"What the run is reached by: {_EXPECTED}.")
 
 
@@ -121,9 +123,23 @@ def _vertices(data):
     return vertices
 
 
+def _fingerprint(moved):
+    return hashlib.blake2b(np.ascontiguousarray(moved), digest_size=16).hexdigest()
+
+
+def _set_edits(data, edits, moved=None):
+    """Has edits come with the output, and the fingerprint of the displacement that they make."""
+    texts = [json.dumps(edits)]
+    vtk.set_texts(data, "edits", texts if moved is None else [*texts, _fingerprint(moved)])
+
+
 def _edits(data):
-    """The edits that come with the input."""
-    return json.loads((vtk.texts(data, "edits") or ["[]"])[0])
+    """The edits that come with the input; none where its displacement is another than they make."""
+    text, *fingerprints = vtk.texts(data, "edits") or ["[]"]
+    edits = json.loads(text)
+    # A filter of ParaView may have put another array in its place.
+    is_theirs = not edits or fingerprints == [_fingerprint(_displacement(data, "displacement"))]
+    return edits if is_theirs else []
 
 
 def _as_edits(vertices, moved):
@@ -135,11 +151,32 @@ def _as_edits(vertices, moved):
 
 
 def _edits_or_displacement(data):
-    """The edits that come with the input; where there are none but it has a displacement, that one as an edit."""
+    """The edits that come with the input; where none stand for the displacement that it has, that one as an edit."""
     edits = _edits(data)
     if edits or not data.GetPointData().HasArray("displacement"):
         return edits
     return _as_edits(_vertices(data), _displacement(data, "displacement"))
+
+
+def _moved(data, surface):
+    """How far the points of the input are from a surface; None where they are of another one."""
+    vertices = _vertices(data)
+    at = np.searchsorted(surface.vertices, vertices).clip(max=len(surface.vertices) - 1)
+    return vtk.points(data) - surface.points[at] if np.array_equal(surface.vertices[at], vertices) else None
+
+
+def _check_points(data, surface, moved):
+    """Points that something else than the displacement has moved show another shape than is ordered."""
+    by = None if surface is None or len(moved) == 0 else _moved(data, surface)
+    # An order for another run than that of its input is of edits alone.
+    if by is None:
+        return
+    size = np.linalg.norm(np.ptp(surface.points, axis=0))
+    if min(np.abs(by - expected).max() for expected in (0, moved)) > 1e-6 * size:
+        raise tombolo.MeshError(
+            "the input: found points that were moved, and not by the array of the order, expected the array to be what"
+            " moved them. An order with an empty Array is of how far the points were moved"
+        )
 
 
 def _of_points(edits, data):
@@ -224,7 +261,8 @@ class _Linked(_Algorithm):
 
     def __init__(self):
         super().__init__()
-        # What holds the run. VTK keeps the attributes of what ParaView has deleted, until others take their place.
+        # What holds the run, and has its view come. VTK keeps the attributes of what ParaView has deleted, until
+        # others take their place.
         self._held = held = []
         self.AddObserver("DeleteEvent", lambda *_: held.clear())
 
@@ -233,7 +271,8 @@ class _Linked(_Algorithm):
     def connected(self):
         """The connection of the link, which lasts as long as a source or filter holds it; None for an empty link."""
         connected = connection(self.link)
-        self._held[:] = [connected]
+        if self._held[:1] != [connected]:
+            self._held[:] = [connected]
         return connected
 
 
@@ -278,6 +317,7 @@ class _Source(_Linked):
 
 
 @smproxy.source(name="TomboloRun", label="Tombolo Run", support_reload=False)
+@smhint.xml(_MENU)
 @smhint.xml('<LiveSource interval="100"/>')
 @smproperty.xml(
     _LINK
@@ -299,10 +339,16 @@ class TomboloRun(_Source):
         names = run.view_names
         if self.view and names and self.view not in names:
             return f"no view '{self.view}'; there are: {', '.join(names)}"
-        return run.views.get(self.view or next(iter(names), ""))
+        name = self.view or next(iter(names), "")
+        if [look.view for look in self._held[1:]] != [name]:
+            # No other view comes, and what nobody shows costs the solver nothing.
+            del self._held[1:]
+            self._held.append(connected.look(name))
+        return run.views.get(name)
 
 
 @smproxy.source(name="TomboloSurface", label="Tombolo Surface", support_reload=False)
+@smhint.xml(_MENU)
 @smhint.xml('<LiveSource interval="500"/>')
 @smproperty.xml(_LINK + _button("Refresh", "Asks for it again, where the run has only begun."))
 class TomboloSurface(_Source):
@@ -313,7 +359,7 @@ class TomboloSurface(_Source):
 
     def convert(self, found):
         made = vtk.of_surface(found)
-        vtk.set_texts(made, "edits", ["[]"])
+        _set_edits(made, [])
         return made
 
 
@@ -321,6 +367,7 @@ class TomboloSurface(_Source):
 
 
 @smproxy.filter(name="TomboloFeaturesByAngle", label="Tombolo Features By Angle", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_input() + _number("Angle", "Degrees from which an edge parts two features.", 30.0))
 class TomboloFeaturesByAngle(_Algorithm):
     """Names the parts of a surface between sharp edges, in place of those that the run has.
@@ -338,7 +385,7 @@ class TomboloFeaturesByAngle(_Algorithm):
         found = vtk.shaper(surface, angle=self.angle).surface
         vtk.add(output.GetCellData(), "features", found.features.astype(np.int32))
         vtk.set_texts(output, "feature_names", found.names)
-        vtk.set_texts(output, "edits", ["[]"])
+        _set_edits(output, [])
         vtk.set_texts(output, "own_features", ["by angle"])
 
 
@@ -365,10 +412,11 @@ class _Edit(_Algorithm):
         edits = [*_edits_or_displacement(surface), self.edit()]
         moved = vtk.shaper(surface).displacement(_of_points(edits, surface))
         vtk.add(output.GetPointData(), "displacement", moved)
-        vtk.set_texts(output, "edits", [json.dumps(edits)])
+        _set_edits(output, edits, moved)
 
 
 @smproxy.filter(name="TomboloTranslate", label="Tombolo Translate", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_FEATURES + _number("By", "How far, in units of the mesh.", 0.0, 0.0, 0.0))
 class TomboloTranslate(_Edit):
     """Moves features by a vector."""
@@ -382,6 +430,7 @@ class TomboloTranslate(_Edit):
 
 
 @smproxy.filter(name="TomboloScaleDirection", label="Tombolo Scale Direction", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_FEATURES + _number("Factors", "Factors along x, y and z.", 1.0, 1.0, 1.0))
 class TomboloScaleDirection(_Edit):
     """Scales features along the axes."""
@@ -395,6 +444,7 @@ class TomboloScaleDirection(_Edit):
 
 
 @smproxy.filter(name="TomboloScaleNormals", label="Tombolo Scale Normals", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_FEATURES + _number("Distance", "How far each vertex moves outwards along its normal.", 0.0))
 class TomboloScaleNormals(_Edit):
     """Moves features along their normals."""
@@ -408,6 +458,7 @@ class TomboloScaleNormals(_Edit):
 
 
 @smproxy.filter(name="TomboloRotate", label="Tombolo Rotate", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(
     _FEATURES
     + _number("Axis", "The direction of the axis, through the middle of the features.", 0.0, 0.0, 1.0)
@@ -426,6 +477,7 @@ class TomboloRotate(_Edit):
 
 
 @smproxy.filter(name="TomboloSkeleton", label="Tombolo Skeleton", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_input())
 class TomboloSkeleton(_Algorithm):
     """The curve skeleton of a surface, with the radius at each node."""
@@ -435,8 +487,9 @@ class TomboloSkeleton(_Algorithm):
 
 
 @smproxy.filter(name="TomboloDragSkeleton", label="Tombolo Drag Skeleton", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(
-    _FEATURES
+    _NAMED
     + _point("At", "A point at the node: the nearest one is dragged.")
     + _point("To", "Where that point is dragged to, and the node by the same way.")
     + _point_widget("Node", "At")
@@ -457,6 +510,7 @@ class TomboloDragSkeleton(_Edit):
 
 
 @smproxy.filter(name="TomboloCombine", label="Tombolo Combine Displacements", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(_input("First", 0) + _input("Second", 1) + _number("Weights", "What each is multiplied by.", 1.0, 1.0))
 class TomboloCombine(_Algorithm):
     """Adds the displacements of two chains of edits of one surface."""
@@ -480,6 +534,7 @@ class TomboloCombine(_Algorithm):
 
 
 @smproxy.filter(name="TomboloExport", label="Tombolo Export Displacement", support_reload=False)
+@smhint.xml(_MENU)
 @smproperty.xml(
     _input()
     + _text("FileName", "The file, which ends in .txt.")
@@ -515,6 +570,7 @@ class TomboloExport(_Algorithm):
 
 
 @smproxy.filter(name="TomboloOrder", label="Tombolo Order", support_reload=False)
+@smhint.xml(_MENU)
 @smhint.xml('<LiveSource interval="200"/>')
 @smproperty.xml(
     _input()
@@ -551,21 +607,20 @@ class TomboloOrder(_Linked):
     def edits(self, connected):
         """The edits of the input, or the displacement that it holds."""
         data = self.GetInputDataObject(0, 0)
+        surface = connected.surface
+        if not self.array:
+            if surface is None:
+                raise tombolo.MeshError("the run: found no surface yet, expected that which points were moved from")
+            moved = _moved(data, surface)
+            if moved is None:
+                raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
+            return _as_edits(_vertices(data), moved)
+        moved = _displacement(data, self.array)
+        _check_points(data, surface, moved)
         edits = _edits(data)
         if self.array == "displacement" and edits and not vtk.texts(data, "own_features"):
             return edits
-        vertices = _vertices(data)
-        if self.array:
-            moved = _displacement(data, self.array)
-        else:
-            surface = connected.surface
-            if surface is None:
-                raise tombolo.MeshError("the run: found no surface yet, expected that which points were moved from")
-            at = np.searchsorted(surface.vertices, vertices).clip(max=len(surface.vertices) - 1)
-            if not np.array_equal(surface.vertices[at], vertices):
-                raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
-            moved = vtk.points(data) - surface.points[at]
-        return _as_edits(vertices, moved)
+        return _as_edits(_vertices(data), moved)
 
     def order(self, connected):
         """The order of the shape that the input shows.

@@ -1,4 +1,4 @@
-"""ParaView with its interface, on a screen in memory: it gives a running nozzle an order, and follows it by itself."""
+"""ParaView with its interface, on a screen in memory: it steers a running nozzle, and follows it by itself."""
 
 import contextlib
 import os
@@ -10,20 +10,25 @@ import numpy as np
 import pytest
 import tombolo
 from conftest import FLOW, GALLERY, study, wait
-from test_paraview import CLIENT, SURFACE, paraview
+from test_paraview import SURFACE, check_shown, paraview
 
 SCREEN = (1152, 768)
 SCRIPT = """
 import os
+from pathlib import Path
 from paraview import servermanager, simple
+from nozzle import *
 
-simple.LoadPlugin(os.environ["PLUGIN"], ns=globals())
-link = os.environ["TOMBOLO_LINK"]
+link, out = os.environ["TOMBOLO_LINK"], Path(os.environ["OUT"])
+with open(out / "told.txt", "w") as file:
+    steer(link, "surface", 200, out, lambda text: print(text, file=file))
+for source in reversed(list(simple.GetSources().values())):
+    simple.Delete(source)
 
 
 def tell(*_):
     cycle = servermanager.Fetch(run).GetFieldData().GetArray("cycle")
-    with open(os.environ["SHOWN"], "a") as file:
+    with open(out / "cycles.txt", "a") as file:
         print(int(cycle.GetValue(0)), file=file)
 
 
@@ -105,10 +110,10 @@ def interface(script, display, folder, **variables):
             process.kill()
 
 
-def test_the_interface_follows_a_run_and_gives_it_an_order(small_nozzle, screen, tmp_path):
+def test_the_interface_steers_a_run_and_follows_it(small_nozzle, screen, tmp_path):
     image = pytest.importorskip("PIL.Image")
     display, memory = screen
-    shown, home = tmp_path / "shown.txt", tmp_path / "home"
+    shown, home = tmp_path / "cycles.txt", tmp_path / "home"
     home.mkdir(0o700)
 
     def cycles():
@@ -119,20 +124,22 @@ def test_the_interface_follows_a_run_and_gives_it_an_order(small_nozzle, screen,
     with (
         study.begun(FLOW, small_nozzle, pipelines, [], tmp_path) as link,
         tombolo.connect(link) as run,
+        interface(SCRIPT, display, home, TOMBOLO_LINK=str(link), OUT=str(tmp_path)) as process,
     ):
-        variables = {"PLUGIN": str(CLIENT / "tombolo_paraview.py"), "TOMBOLO_LINK": str(link), "SHOWN": str(shown)}
-        with interface(SCRIPT, display, home, **variables) as process:
-            said = home / "said.txt"
-            wait(lambda: process.poll() is not None or "Traceback" in said.read_text() or cycles(), 120)
-            assert process.poll() is None and cycles(), said.read_text()
-            # The order is given in ParaView, and its script has ended: the interface asks for what is new.
-            wait(lambda: [order.status for order in run.orders] == ["applied"], 120)
-            applied = run.orders[0].cycle_applied + 20
-            wait(lambda: cycles()[-1] > applied + 50, 120)
-            # What is fetched is drawn a moment later.
-            time.sleep(1)
-            pixels = picture(memory)
+        said = home / "said.txt"
+        wait(lambda: process.poll() is not None or "Traceback" in said.read_text() or cycles(), 180)
+        assert process.poll() is None and cycles(), said.read_text()
+        # The last order is given in ParaView, and its script has ended: the interface asks for what is new.
+        wait(lambda: [order.status for order in run.orders] == 7 * ["applied"], 120)
+        applied = run.orders[-1].cycle_applied + 20
+        wait(lambda: cycles()[-1] > applied + 50, 120)
+        # What is fetched is drawn a moment later.
+        time.sleep(1)
+        pixels = picture(memory)
     assert np.all(np.diff(cycles()) >= 0)
+    told = (tmp_path / "told.txt").read_text()
+    assert [told.count(f"{what}: applied") for what in ("forecast", "order", "undo")] == [3, 3, 3], told
+    check_shown(tmp_path)
 
     view = pixels[200:720, 310:1140].astype(int)
     red = (view[..., 0] > view[..., 2] + 30).any(axis=0)

@@ -144,3 +144,35 @@ def test_a_late_frame_of_a_removed_view_is_not_that_of_a_new_one():
     state.views["skin"] = "late"
     state.take("hello", {"hello": dict(told)})
     assert not state.views
+
+
+def test_the_views_that_are_chosen_are_those_that_come(run, solver):
+    skin = {"name": "skin", "stages": [{"surface": {}}, {"stream": {}}]}
+    run.change_pipelines({"set": [skin]}, timeout=30)
+    run.wait_for_view("skin", timeout=30)
+    run.choose_views(["skin"])
+    assert "midplane" not in run.views
+    with pytest.raises(KeyError, match="'midplane' come: it was not chosen"):
+        run.views["midplane"]
+    with pytest.raises(tombolo.CallError, match="'midplane' come: it was not chosen"):
+        run.wait_for_view("midplane", timeout=30)
+    now = run.status.cycle
+    assert run.wait_for_view("skin", after=now, timeout=30).cycle > now
+    with pytest.raises(KeyError, match=r"no view 'sknn' .did you mean 'skin'"):
+        run.choose_views(["skin", "sknn"])
+    with pytest.raises(TypeError, match="found the text 'skin'"):
+        run.choose_views("skin")
+    run.choose_views()
+    now = run.status.cycle
+    # What it showed before it was left out is not shown again.
+    view = run.wait_for_view("midplane", timeout=30)
+    assert view.cycle > now - 20 and len(view.triangles)
+
+    with tombolo.connect(solver.link, views=["midplane"]) as other:
+        now = other.status.cycle
+        other.wait_for_view("midplane", after=now, timeout=30)
+        assert list(other.views) == ["midplane"]
+    with pytest.raises(KeyError, match="no view 'nothing'"):
+        tombolo.connect(solver.link, views=["nothing"])
+    with pytest.raises(TypeError, match="found the text 'midplane'"):
+        tombolo.connect(solver.link, views="midplane")

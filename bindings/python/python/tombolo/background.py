@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time as clock
 import weakref
@@ -13,7 +14,7 @@ from .orders import Edits, Order
 from .run import Run, connect
 from .views import Surface
 
-__all__ = ["Connection", "Requests", "connection"]
+__all__ = ["Connection", "Look", "Requests", "connection"]
 
 #: Seconds until a run that was not reached is tried again.
 _AGAIN = 5.0
@@ -23,8 +24,26 @@ _CONNECTIONS: weakref.WeakValueDictionary[str, Connection] = weakref.WeakValueDi
 _LOCK = threading.Lock()
 
 
+class Look:
+    """One who looks at a view of a connection, as long as anybody refers to it: `Connection.look` makes it.
+
+    Attributes
+    ----------
+    connection : Connection
+        The connection, which lasts as long.
+    view : str
+        The name of the view.
+    """
+
+    def __init__(self, connection: Connection, view: str) -> None:
+        self.connection = connection
+        self.view = view
+
+
 class Connection:
     """A run that a thread of its own connects to. What is not there yet is None.
+
+    Of the live views those come at which somebody looks (`look`).
 
     Once the run has ended it is looked for again: another one may be under way behind the same link, such as a file.
     Until then all stays as it was. A surface that did not come is asked for again as well. It lasts as long as anybody
@@ -48,8 +67,33 @@ class Connection:
         self.surface: Optional[Surface] = None
         self.failure: Optional[str] = None
         self._again = 0.0
+        self._looks: weakref.WeakSet[Look] = weakref.WeakSet()
         self._thread: Optional[threading.Thread] = None
         self._ask()
+
+    def look(self, view: str) -> Look:
+        """Look at a live view: its frames come to `run.views` as long as anybody refers to what is returned.
+
+        Parameters
+        ----------
+        view : str
+            The name of the view, which the run may get later.
+        """
+        look = Look(self, view)
+        self._looks.add(look)
+        self._choose()
+        return look
+
+    def _choose(self) -> None:
+        """Choose the views at which somebody looks now."""
+        run = self.run
+        if run is None or not run.connected:
+            return
+        names = frozenset(look.view for look in list(self._looks)) & frozenset(run.view_names)
+        if names != run.chosen_views:
+            # It may end meanwhile, of which whoever looks hears.
+            with contextlib.suppress(TomboloError):
+                run.choose_views(names)
 
     def _ask(self) -> None:
         """Try, unless it is being tried, is there or was tried just now."""
@@ -63,6 +107,7 @@ class Connection:
 
     def _begin(self, run: Run) -> None:
         before, self.run, self.surface, self.failure = self.run, run, None, None
+        self._choose()
         if before is not None:
             before.close()
 
@@ -126,6 +171,7 @@ def connection(link: str) -> Optional[Connection]:
         if known is None:
             known = _CONNECTIONS[link] = Connection(link)
         known._ask()
+        known._choose()
         return known
 
 
