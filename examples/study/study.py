@@ -261,7 +261,7 @@ class Study:
 
     @property
     def mean(self) -> float:
-        """The steps that an answer took, in the mean."""
+        """The steps that an answer took, on average."""
         return float(np.mean([answer.steps for answer in self.answers]))
 
 
@@ -457,7 +457,7 @@ def tell(comparison: Comparison, name: str) -> None:
                 f"  {name} {answer.value:.4f}: {answer.result:.4g} {quantity.unit}, settled after {answer.steps} steps"
             )
     print(f"steps, running / anew: {running.spent / restarted.spent:.2f} in all", end=", ")
-    print(f"{running.mean / restarted.mean:.2f} for an answer, in the mean")
+    print(f"{running.mean / restarted.mean:.2f} per answer, on average")
 
 
 def conclude(

@@ -33,33 +33,54 @@ def arrays(shown, name):
 
 
 def layouts(values):
-    """The same numbers in many layouts, each with the base address of every column."""
-    wide = np.zeros((len(values), 7), values.dtype)
-    wide[:, 1:6:2] = values
+    """The same numbers in many layouts."""
+    wide = np.zeros((len(values), 2 * values.shape[1] + 1), values.dtype)
+    wide[:, 1::2] = values
     frozen = values.copy()
     frozen.flags.writeable = False
     return {
         "rows": values.copy(),
         "columns": np.asfortranarray(values),
-        "strided": wide[:, 1:6:2],
+        "strided": wide[:, 1::2],
         "read only": frozen,
         "transposed": np.ascontiguousarray(values.T).T,
     }
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_arrays_of_any_layout_are_borrowed_where_they_lie(dtype):
+def where_they_lie(values):
+    """What `arrays` says of each column that is borrowed as it lies."""
+    return [[values[:, column].ctypes.data, len(values), True] for column in range(values.shape[1])]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.int64])
+def test_points_of_any_layout_are_borrowed_where_they_lie(dtype):
     for name, points in layouts(POINTS.astype(dtype)).items():
-        lent = arrays(mesh(points), "points")
-        expected = [points[:, axis].__array_interface__["data"][0] for axis in range(3)]
-        assert [address for address, _, _ in lent] == expected, name
-        assert all(count == len(points) and borrowed for _, count, borrowed in lent), name
+        assert arrays(mesh(points), "points") == where_they_lie(points), name
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.int64, np.uint8])
+def test_fields_of_any_layout_are_borrowed_where_they_lie(dtype):
+    for name, values in layouts(np.arange(3 * len(POINTS)).reshape(-1, 3).astype(dtype)).items():
+        assert arrays(mesh(fields={"values": values}), "values") == where_they_lie(values), name
+        assert arrays(mesh(fields={"values": values[:, 1]}), "values") == where_they_lie(values[:, 1:2]), name
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint32, np.uint64])
-def test_cells_are_borrowed(dtype):
-    cells = TETS.astype(dtype)
-    assert arrays(mesh(cells={"tetra": cells}), "cells") == [[cells.ctypes.data, cells.size, True]]
+def test_cells_of_one_type_are_borrowed_where_row_follows_row(dtype):
+    for name, cells in layouts(TETS.astype(dtype)).items():
+        is_borrowed = name in ("rows", "read only")
+        assert arrays(mesh(cells={"tetra": cells}), "cells") == [[cells.ctypes.data, cells.size, is_borrowed]], name
+
+
+def test_other_cells_are_copied():
+    offsets, types = np.arange(0, TETS.size + 1, 4), np.full(len(TETS), 10)
+    for cells in (
+        {"tetra": TETS.astype(np.int16)},
+        {"tetra": TETS, "pyramid": np.empty((0, 5), int)},
+        {"connectivity": TETS.ravel(), "offsets": offsets, "types": types},
+    ):
+        lent = arrays(mesh(cells=cells), "cells")
+        assert lent and not any(is_borrowed for *_, is_borrowed in lent)
 
 
 def test_fields_are_borrowed_by_their_length():

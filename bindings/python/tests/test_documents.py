@@ -1,4 +1,4 @@
-"""The snippets of docs/python.md, from the first to the last, and the examples of docstrings that need a run."""
+"""The snippets of docs/python.md and README.md, and the examples of docstrings that need a run."""
 
 import ast
 import asyncio
@@ -13,12 +13,22 @@ import conftest
 import numpy as np
 import pytest
 import tombolo
-import tombolo.jupyter
-from conftest import ends
+from conftest import box, ends
 
 PAGE = Path(__file__).parents[3] / "docs/python.md"
+FRONT = Path(__file__).parents[3] / "README.md"
 PACKAGE = Path(tombolo.__file__).parent
 LINK = "http://127.0.0.1:7070/?token=..."
+
+
+def carry_out(page, link, names_at):
+    """Run the snippets of a page, from the first to the last, each with the names that there are at its place."""
+    text = page.read_text()
+    snippets = list(re.finditer(r"^```python\n(.*?)^```", text, re.S | re.M))
+    for snippet in snippets:
+        line, names = text[: snippet.start()].count("\n") + 1, names_at(text[: snippet.start()])
+        exec(compile("\n" * line + snippet[1].replace(LINK, link), str(page), "exec"), names)
+    return len(snippets)
 
 
 def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
@@ -35,18 +45,31 @@ def test_the_tutorial_runs(begin, tmp_path, monkeypatch, capsys):
             {"name": "heat", "stages": [{"statistics": {"field": "temperature"}}]},
         ],
     }
-    names = {"link": begin(configuration).link}
+    # The client is another program than the solver, and has none of its names.
+    solver, client = {}, {}
+
+    def names_at(before):
+        return client if "\n## From outside" in before and "\n## Without a run" not in before else solver
+
     try:
-        text = PAGE.read_text()
-        snippets = list(re.finditer(r"^```python\n(.*?)^```", text, re.S | re.M))
-        assert len(snippets) > 5
-        for snippet in snippets:
-            line = text[: snippet.start()].count("\n") + 1
-            exec(compile("\n" * line + snippet[1], str(PAGE), "exec"), names)
+        assert carry_out(PAGE, begin(configuration).link, names_at) > 5
+    finally:
+        client["run"].close() if "run" in client else None
+    assert "0.8 applied" in capsys.readouterr().out
+    assert isinstance(solver["shape"], tombolo.Shape)
+
+
+def test_the_lines_of_the_front_page_run(begin, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(conftest, "ends", parts_of_a_channel)
+    (tmp_path / "pipelines.json").write_text('{"version": 1}')
+    points, tets = box(2)
+    names = {"tombolo": tombolo, "points": points, "tets": tets, "temperature": np.zeros(len(points)), "steps": 3}
+    names |= {"time": 0.0, "time_step": 0.1}
+    try:
+        assert carry_out(FRONT, begin().link, lambda before: names) == 1
     finally:
         names["run"].close() if "run" in names else None
-    assert "0.8 applied" in capsys.readouterr().out
-    assert isinstance(names["shape"], tombolo.Shape)
 
 
 def examples():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Optional, SupportsIndex, TypeVar, Union
 
@@ -17,7 +17,7 @@ from .errors import CallError, EndedError, LinkError, WaitError
 from .events import Callbacks, Event, check_kinds, iterate
 from .monitors import Monitors
 from .state import Parameter, State, Status
-from .views import NOT_WANTED, Surface, View, Views
+from .views import NOT_WANTED, Surface, View, Views, not_chosen
 
 Found = TypeVar("Found")
 #: A step, also as a table of monitors has it.
@@ -36,6 +36,8 @@ class Watched:
         self.link = link
         self._watch = watch
         self._has_views = views
+        # The names of the views that are looked at; None for all.
+        self._chosen: Optional[frozenset[str]] = None
         self._state = State()
         client = in_thread(lambda: _native.Client(link, views, watch, attempts, timeout))
         self._reader = Reader(client, self._state)
@@ -75,7 +77,46 @@ class Watched:
     @property
     def views(self) -> Mapping[str, View]:
         """The newest frame of each live view that has come; none of a view that was removed."""
-        return Views(self._state.views, lambda: self.view_names, self._has_views)
+        return Views(self._state.views, lambda: self.view_names, lambda: self._chosen, self._has_views)
+
+    @property
+    def chosen_views(self) -> Optional[frozenset[str]]:
+        """The names of the live views whose frames come; None for all."""
+        return self._chosen if self._has_views else frozenset()
+
+    def choose_views(self, names: Optional[Iterable[str]] = None) -> None:
+        """Choose the live views whose frames come; all of them come at first.
+
+        A view at which nobody looks rests: it costs the solver nothing.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            Their names; none of them for an empty list, all of them for None.
+
+        Raises
+        ------
+        KeyError
+            There is no such view.
+        CallError
+            No frames come at all: the run was connected with ``views=False``.
+        """
+        if not self._has_views:
+            raise CallError(NOT_WANTED)
+        if isinstance(names, str):
+            raise TypeError(f"names: found the text {names!r}, expected a list of names")
+        chosen = None if names is None else frozenset(names)
+        for name in chosen or ():
+            if name not in self.view_names:
+                raise KeyError(unknown("view", name, self.view_names))
+        client = self._reader.client
+        with self._reader.changed:
+            before, self._chosen = self._chosen, chosen
+            # One that is chosen later begins anew: what it showed last is old by then.
+            for name in list(self._state.views):
+                if (before is not None and name not in before) or (chosen is not None and name not in chosen):
+                    del self._state.views[name]
+        client.choose_views(None if chosen is None else set(chosen))
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -89,7 +130,10 @@ class Watched:
 
     @property
     def features(self) -> list[dict[str, Any]]:
-        """The named parts of the surface, each with `name`, `faces`, `vertices` and `bounds`."""
+        """The named parts of the surface, each with `name`, `faces`, `vertices` and `bounds`.
+
+        The bounds are in the unit of length of the mesh.
+        """
         return list(self._state.hello.get("features", []))
 
     @property
@@ -106,6 +150,8 @@ class Watched:
     @property
     def stack(self) -> list[dict[str, Any]]:
         """The edits that make the present shape, the oldest first, as the run answers now.
+
+        Lengths are in the unit of length of the mesh, angles in degrees.
 
         Raises
         ------
@@ -140,7 +186,10 @@ class Watched:
 
     @property
     def end(self) -> Optional[dict[str, Any]]:
-        """How the run has ended, where it has: `how` (`finished`, `stopped` or `failed`), `cycle` and `time`."""
+        """How the run has ended, where it has: `how` (`finished`, `stopped` or `failed`), `cycle` and `time`.
+
+        The time is in the solver's unit of time.
+        """
         return self._state.end
 
     @property
@@ -196,6 +245,11 @@ class Watched:
         timeout : float, optional
             Seconds, at most; without it there is no limit.
 
+        Returns
+        -------
+        object
+            What `found` has returned.
+
         Raises
         ------
         WaitError
@@ -216,7 +270,29 @@ class Watched:
         return self._reader.wait_for(found, timeout)
 
     def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
-        """Wait until the solver has told a step from `cycle` on, and return its status."""
+        """Wait until the solver has told a step from `cycle` on, and return its status.
+
+        Parameters
+        ----------
+        cycle : int
+            The step; a number from a table of monitors will do.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        Status
+            The newest status, which may be of a later step.
+
+        Raises
+        ------
+        ConfigurationError
+            The cycle is no number.
+        WaitError
+            No such step came in time.
+        EndedError, LinkError
+            None came before the run has ended, or the connection was lost for good.
+        """
         return self._reader.carry_out(self._wait_for_cycle(cycle, timeout))
 
     def _wait_for_cycle(self, cycle: Cycle, timeout: Optional[float]) -> Parts[Status]:
@@ -231,14 +307,31 @@ class Watched:
     def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
         """Wait for a frame of a view, of a step after the cycle `after` where that is given, and return it.
 
+        Parameters
+        ----------
+        name : str
+            The name of the view, one of `view_names`. One that is not known is waited for 2 seconds: it may have been
+            added a moment ago.
+        after : int, optional
+            The step that the frame has to be later than. Left out: one that is there already will do.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        View
+            The newest frame of the view.
+
         Raises
         ------
         KeyError
             There is no such view.
         CallError
-            No frames come at all: the run was connected with ``views=False``.
+            No frames of it come: it was not chosen, or the run was connected with ``views=False``.
         WaitError
             None came in time.
+        EndedError, LinkError
+            None came before the run has ended, or the connection was lost for good.
         """
         return self._reader.carry_out(self._wait_for_view(name, after, timeout))
 
@@ -257,11 +350,31 @@ class Watched:
                 yield (lambda: name in self.view_names), patience, "it was not announced"
             except WaitError:
                 raise KeyError(unknown("view", name, self.view_names)) from None
+        if self._chosen is not None and name not in self._chosen:
+            raise CallError(not_chosen(name))
         view: View = yield found, timeout, f"no {'' if after is None else 'newer '}frame of the view '{name}' came"
         return view
 
     def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
-        """Wait until the run has ended, and return how."""
+        """Wait until the run has ended, and return how.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        dict
+            What `end` is. `how` is `unknown`, and alone, where the run has gone without a word.
+
+        Raises
+        ------
+        WaitError
+            It did not end in time.
+        LinkError
+            The connection was lost for good.
+        """
         return self._reader.carry_out(self._wait_for_end(timeout))
 
     def _wait_for_end(self, timeout: Optional[float]) -> Parts[dict[str, Any]]:
@@ -308,6 +421,13 @@ class Watched:
         It is called on a thread of its own, one event at a time, and may wait and give orders. What it raises is
         printed, and it is called again. While there is such a function, the run stays connected until it is closed,
         though nothing else refers to it.
+
+        Parameters
+        ----------
+        kind : str or None
+            Only events of this kind, which `Event` lists; None: all.
+        callback : callable
+            The function, which takes an `Event`.
 
         Returns
         -------

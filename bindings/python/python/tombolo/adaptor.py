@@ -42,7 +42,7 @@ class SurfaceMotion:
     vertices : array of shape (b,), uint32
         The vertices: numbers into the points that the solver lends. They stay the same in the whole run.
     coordinates, displacement, velocity : arrays of shape (b, 2) or (b, 3)
-        Of each of these vertices what `Motion` has of all.
+        Of each of these vertices what `Motion` has of all, in the same units.
     """
 
     __slots__ = ("_motion",)
@@ -57,17 +57,23 @@ class SurfaceMotion:
 
     @property
     def coordinates(self) -> NDArray[np.float64]:
-        """The coordinates of each vertex of the boundary at the end of the step."""
+        """The coordinates of each vertex of the boundary at the end of the step, in the unit of length of the mesh."""
         return self._motion.surface_coordinates
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """How far each vertex of the boundary moves over the step: from the coordinates as they were lent."""
+        """How far each vertex of the boundary moves over the step: from the coordinates as they were lent.
+
+        It is in the unit of length of the mesh.
+        """
         return self._motion.surface_displacement
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """The velocity of each vertex of the boundary: `displacement / time_step`; 0 in a steady solver."""
+        """The velocity of each vertex of the boundary: `displacement / time_step`; 0 in a steady solver.
+
+        It is in the unit of length of the mesh, divided by the solver's unit of time.
+        """
         return self._motion.surface_velocity
 
 
@@ -80,12 +86,13 @@ class Motion:
     Attributes
     ----------
     coordinates : array of shape (n, 2) or (n, 3)
-        The coordinates of each vertex at the end of the step. With every order taken back they are the reference's,
-        bit for bit.
+        The coordinates of each vertex at the end of the step, in the unit of length of the mesh. With every order taken
+        back they are the reference's, bit for bit.
     displacement : array of that shape
-        From the coordinates as they were lent to these.
+        From the coordinates as they were lent to these, in the same unit.
     velocity : array of that shape
-        `displacement / time_step`, for an ALE solver; 0 in a steady one.
+        `displacement / time_step`, for an ALE solver: in the unit of length of the mesh, divided by the solver's unit
+        of time; 0 in a steady solver.
     surface : SurfaceMotion
         The motion of the boundary's vertices alone.
     order : str
@@ -104,17 +111,20 @@ class Motion:
 
     @property
     def coordinates(self) -> NDArray[np.float64]:
-        """The coordinates of each vertex at the end of the step."""
+        """The coordinates of each vertex at the end of the step, in the unit of length of the mesh."""
         return self._motion.coordinates
 
     @property
     def displacement(self) -> NDArray[np.float64]:
-        """How far each vertex moves over the step: from the coordinates as they were lent."""
+        """How far each vertex moves over the step: from the coordinates as they were lent, in the same unit."""
         return self._motion.displacement
 
     @property
     def velocity(self) -> NDArray[np.float64]:
-        """The velocity of each vertex, `displacement / time_step`, for an ALE solver; 0 in a steady one."""
+        """The velocity of each vertex, `displacement / time_step`, for an ALE solver; 0 in a steady one.
+
+        It is in the unit of length of the mesh, divided by the solver's unit of time.
+        """
         return self._motion.velocity
 
     @property
@@ -152,7 +162,7 @@ class Steering(NamedTuple):
     stop : bool
         Whether the solver should end. Once true it stays true.
     parameters : mapping of str to float
-        All parameters and their values now.
+        All parameters and their values now, each in the unit that the solver has it in.
     """
 
     motion: Optional[Motion]
@@ -322,9 +332,9 @@ class Adaptor:
         cycle : int
             The number of the step, from 0 on.
         time : float
-            The simulated time, in the solver's unit.
+            The simulated time, in the solver's unit of time.
         time_step : float
-            The length of the step that follows; 0 in a steady solver.
+            The length of the step that follows, in the same unit; 0 in a steady solver.
         channels : dict from names to meshes
             The meshes, each a `Mesh` or a dict of what one is made from. The first is the one that orders change,
             unless the configuration names another. One mesh alone is the channel `mesh`.
@@ -358,30 +368,65 @@ class Adaptor:
         """Whether anything at this step looks at the mesh and its fields.
 
         A solver that has to compute a field only to show it asks first.
+
+        Parameters
+        ----------
+        cycle, time, time_step : int, float, float
+            The step, as `execute` takes it.
+
+        Returns
+        -------
+        bool
+            Whether `execute` will look at them, such as for a pipeline that is due or for an order.
+
+        Raises
+        ------
+        StepError
+            As of `execute`.
+        CallError
+            The adaptor is closed, or in a call of another thread.
         """
         return self._run.looks_at(cycle, time, time_step)
 
     @property
     def link(self) -> Optional[str]:
-        """What a viewer opens, and `connect` takes, with the secret of those who may steer; None without a server."""
+        """What a viewer opens, and `connect` takes, with the secret of those who may steer; None without a server.
+
+        It is for programs and can be used any number of times: do not print it where others read. `invitation` is for
+        people.
+        """
         return self._run.link
 
     @property
     def watching_link(self) -> Optional[str]:
-        """The link of those who watch and can never steer; None without a server."""
+        """The link of those who watch and can never steer, which `connect` takes too; None without a server."""
         return self._run.watching_link
 
     def invitation(self) -> Optional[str]:
         """What to print for a person to open the run; None without a server.
 
-        On a terminal it holds a link that opens one browser, once. Elsewhere, as in the log of a batch job, it names
-        the file that holds the links and that only its owner can read.
+        The file ``tombolo-PORT.link`` is written in the directory of the output, with the links for driving and for
+        watching; only its owner can read it, and `connect` and other programs take it. On a terminal the text holds a
+        link that opens one browser, once, and lets no program in. Elsewhere, as in the log of a batch job, it names the
+        file alone.
+
+        Returns
+        -------
+        str or None
+            The text, of one or more lines.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        CallError
+            The adaptor is closed, or in a call of another thread.
         """
         return self._run.invitation(sys.stdout.isatty())
 
     @property
     def parameters(self) -> Mapping[str, float]:
-        """The parameters and their values now."""
+        """The parameters and their values now, each in the unit that the solver has it in."""
         return self._still.parameters
 
     @property

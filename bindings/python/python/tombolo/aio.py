@@ -175,6 +175,11 @@ def connect(link: Union[str, os.PathLike[str]], **settings: Any) -> _Connecting:
     awaitable of AsyncRun
         The run, which an `async with` block gives too.
 
+    Raises
+    ------
+    LinkError, WaitError
+        As of `tombolo.connect`, where it is awaited.
+
     Examples
     --------
     ::
@@ -206,11 +211,17 @@ class AsyncOrder:
         return getattr(self.order, name)
 
     async def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
-        """Wait until the solver has been given its last shape, as `Order.wait` does."""
+        """Wait until the solver has been given its last shape, as `Order.wait` does.
+
+        Parameters, Returns and Raises are as of `Order.wait`.
+        """
         return await _carry_out(self.order._run._reader, self.order._wait(timeout, until))
 
     async def cancel(self, *, timeout: Optional[float] = None) -> Command:
-        """Take it back, where it has not begun to move the mesh, and wait until that is done."""
+        """Take it back, where it has not begun to move the mesh, and wait until that is done.
+
+        Parameters, Returns and Raises are as of `Run.cancel`, without `wait`.
+        """
         return await self.order._run.aio.cancel(self.order, timeout=timeout)
 
     def __repr__(self) -> str:
@@ -284,7 +295,12 @@ class AsyncRun:
     ) -> AsyncOrder:
         """Give an order of a new shape, as `Run.order` does.
 
-        A call that is cancelled while it waits for the wheel gives none.
+        A call that is cancelled while it waits for the wheel gives none. Parameters and Raises are as of `Run.order`.
+
+        Returns
+        -------
+        AsyncOrder
+            The order, which has been sent.
         """
         prepared = await self._prepared(
             edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline
@@ -295,7 +311,15 @@ class AsyncRun:
         return await _in_thread(lambda: self.run._prepared(_text(edits, **settings)))
 
     async def undo(self, count: SupportsIndex = 1) -> AsyncOrder:
-        """Take the last orders back; returns the order that does so, as `Run.undo` does."""
+        """Take the last orders back, as `Run.undo` does.
+
+        Parameters and Raises are as of `Run.undo`.
+
+        Returns
+        -------
+        AsyncOrder
+            The order that takes them back, which has been sent.
+        """
         orders = whole(count, "count", 1)
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
 
@@ -308,18 +332,27 @@ class AsyncRun:
         guard: Optional[Mapping[str, Any]] = None,
         timeout: Optional[float] = None,
     ) -> Forecast:
-        """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes."""
+        """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes.
+
+        Parameters, Returns and Raises are as of `Run.forecast`.
+        """
         seconds(timeout)
         prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
         question = await self._send(lambda client: client.forecast(prepared), timeout)
         return await self._carry_out(self.run._foretold(question, timeout))
 
     async def hand_over(self, to: str, timeout: float = 60.0) -> None:
-        """Give the wheel to another client, as `Run.hand_over` does."""
+        """Give the wheel to another client, as `Run.hand_over` does.
+
+        Parameters and Raises are as of `Run.hand_over`.
+        """
         await _in_thread(lambda: self.run.hand_over(to, timeout))
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
-        """Make a link for somebody else, as `Run.link_for` does."""
+        """Make a link for somebody else, as `Run.link_for` does.
+
+        Parameters, Returns and Raises are as of `Run.link_for`.
+        """
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
     async def _send(self, send: Callable[[_native.Client], str], timeout: Optional[float] = None) -> str:
@@ -337,68 +370,113 @@ class AsyncRun:
         return await self._carry_out(command._wait(left(begin, timeout), timeout))
 
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
-        """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it."""
+        """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it.
+
+        Parameters, Returns and Raises are as of `Run.set`, without `wait`.
+        """
         given = number(value, f"parameter {parameter!r}")
         return await self._give(lambda client: client.set(parameter, given), "set", timeout)
 
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
-        """Hold the solver at its next safe point, and wait until it is held."""
+        """Hold the solver at its next safe point, and wait until it is held.
+
+        Parameters, Returns and Raises are as of `Run.pause`, without `wait`.
+        """
         return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
-        """Let the solver go on, and wait until it does."""
+        """Let the solver go on, and wait until it does.
+
+        Parameters, Returns and Raises are as of `Run.resume`, without `wait`.
+        """
         return await self._give(lambda client: client.resume(), "resume", timeout)
 
     async def stop(self, *, timeout: Optional[float] = None) -> Command:
-        """Ask the solver to end, and wait until it was told so."""
+        """Ask the solver to end, and wait until it was told so.
+
+        Parameters, Returns and Raises are as of `Run.stop`, without `wait`.
+        """
         return await self._give(lambda client: client.stop(), "stop", timeout)
 
     async def cancel(self, order: Given, *, timeout: Optional[float] = None) -> Command:
-        """Take back an order that has not begun to move the mesh, as `Run.cancel` does, and wait until that is done."""
+        """Take back an order that has not begun to move the mesh, as `Run.cancel` does, and wait until that is done.
+
+        Parameters, Returns and Raises are as of `Run.cancel`, without `wait`.
+        """
         identity = id_of(order, "order")
         return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
 
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
-        """Change the pipelines while the run goes on, as `Run.change_pipelines` does, and wait until it is done."""
+        """Change the pipelines while the run goes on, as `Run.change_pipelines` does, and wait until it is done.
+
+        Parameters, Returns and Raises are as of `Run.change_pipelines`, without `wait`.
+        """
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
     async def drive(self, timeout: Optional[float] = None) -> None:
-        """Take the wheel, as `Run.drive` does."""
+        """Take the wheel, as `Run.drive` does.
+
+        Parameters and Raises are as of `Run.drive`.
+        """
         until = moment_after(WHEEL if timeout is None else timeout)
         while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
             pass
 
     async def surface(self) -> Surface:
-        """Ask for the reference surface: what `Run.surface` is."""
+        """Ask for the reference surface: what `Run.surface` is.
+
+        Returns and Raises are as of `Run.surface`.
+        """
         return await _in_thread(lambda: self.run.surface)
 
     async def stack(self) -> list[dict[str, Any]]:
-        """Ask for the edits that make the present shape: what `Run.stack` is."""
+        """Ask for the edits that make the present shape: what `Run.stack` is.
+
+        Returns and Raises are as of `Run.stack`.
+        """
         return await _in_thread(lambda: self.run.stack)
 
     async def pipelines(self) -> list[dict[str, Any]]:
-        """Ask for the pipelines as they are now: what `Run.pipelines` is."""
+        """Ask for the pipelines as they are now: what `Run.pipelines` is.
+
+        Returns and Raises are as of `Run.pipelines`.
+        """
         return await _in_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
-        """Wait until `found`, which is called on the loop, returns something true, as `Run.wait_for` does."""
+        """Wait until `found`, which is called on the loop, returns something true, as `Run.wait_for` does.
+
+        Parameters, Returns and Raises are as of `Run.wait_for`.
+        """
         return await _wait_for(self.run._reader, found, timeout)
 
     async def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
-        """Wait until the solver has told a step from `cycle` on, and return its status."""
+        """Wait until the solver has told a step from `cycle` on, and return its status.
+
+        Parameters, Returns and Raises are as of `Run.wait_for_cycle`.
+        """
         return await self._carry_out(self.run._wait_for_cycle(cycle, timeout))
 
     async def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
-        """Wait for a frame of a view, and return it, as `Run.wait_for_view` does."""
+        """Wait for a frame of a view, and return it, as `Run.wait_for_view` does.
+
+        Parameters, Returns and Raises are as of `Run.wait_for_view`.
+        """
         return await self._carry_out(self.run._wait_for_view(name, after, timeout))
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
-        """Wait until the run has ended, and return how."""
+        """Wait until the run has ended, and return how.
+
+        Parameters, Returns and Raises are as of `Run.wait`.
+        """
         return await self._carry_out(self.run._wait_for_end(timeout))
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
-        """Iterate over what the run tells from now on by `async for`; the wait for one event may be cancelled."""
+        """Iterate over what the run tells from now on by `async for`; the wait for one event may be cancelled.
+
+        Parameters, Yields and Raises are as of `Run.events`, without `timeout`: `asyncio.wait_for` has one.
+        """
         check_kinds(kinds)
         return _Events(self.run, kinds)
 

@@ -50,6 +50,11 @@ def viewer(link: str, pages: Sequence[str] = ()) -> str:
         the frame has the name that the first of them gives it (``localhost``, ``127.0.0.1``): a browser that shows the
         notebook under another name than the viewer keeps the viewer's cookie back.
 
+    Returns
+    -------
+    str
+        The HTML. Of a run that listens on a socket at a path it is a sentence that says so.
+
     Examples
     --------
     >>> from tombolo.jupyter import viewer
@@ -96,6 +101,11 @@ def summary(run: Run) -> str:
     ----------
     run : Run
         The run.
+
+    Returns
+    -------
+    str
+        The HTML.
     """
     status, end = run._state.status, run.end
     rows = [("run", run.link.split("?")[0]), ("state", _state(run))]
@@ -141,6 +151,8 @@ class Plot:
     Examples
     --------
     ::
+
+        import tombolo.jupyter
 
         tombolo.jupyter.Plot(run, "outlet", "flow")           # as it is now
         tombolo.jupyter.Plot(run, "outlet", "flow").live()    # until the run ends, or the cell is interrupted

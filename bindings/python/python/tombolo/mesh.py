@@ -55,8 +55,9 @@ class Mesh:
     Parameters
     ----------
     points : array of shape (n, 2) or (n, 3)
-        The coordinates of each vertex, in the solver's unit; also one array `(n,)` for each axis. With two of them,
-        orders that would move a vertex along the third axis are rejected.
+        The coordinates of each vertex, in the solver's unit of length, which is that of all lengths in edits, views and
+        motions; also one array `(n,)` for each axis. With two of them, orders that would move a vertex along the third
+        axis are rejected.
     cells : dict, optional
         From cell types to vertex numbers, counted from 0, a row for each cell: ``{"tetra": tets}`` with an array
         `(m, 4)`. Types are called `vertex`, `line`, `triangle`, `quad`, `tetra`, `hexahedron`, `wedge`, `pyramid`, ...
@@ -80,10 +81,15 @@ class Mesh:
 
     Notes
     -----
-    Arrays of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first, with strides,
-    read-only. Cells of one type are borrowed where their array is contiguous. Anything else, such as another byte
-    order, negative strides or float16, is copied once it is looked at or is an error that says so. An array of
-    `numpy.ma` of which values are masked is an error.
+    Points and fields of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first,
+    with strides, read-only. Those of another type of whole numbers, of another byte order, with negative strides or not
+    aligned are copied at each step that looks at them. Other types, such as float16 and complex numbers, are errors,
+    and so is an array of `numpy.ma` of which values are masked.
+
+    Cells of one type are borrowed where their array is of int32, int64, uint32 or uint64 and C-contiguous; it may be
+    read-only. Others are copied once, and again where they have changed: those in Fortran order or with strides, as
+    ``mesh.t.T`` of scikit-fem, those of several types, and those in VTK's form. `faces`, `vertex_features` and what
+    there is for several ranks are copied likewise.
 
     Fields and named parts are read at steps that look at them (`Adaptor.looks_at`), and where the mesh has another size
     than before: what is wrong with one, such as its length, is told then.
@@ -151,6 +157,11 @@ def faces_of_features(
     -------
     dict or None
         In the order of the numbers; None where no face has a feature.
+
+    Raises
+    ------
+    MeshError
+        The number of a feature is not whole.
     """
     found: dict[int, dict[Union[str, int], list[NDArray[Any]]]] = {}
     for kind, rows, numbers in parts:

@@ -22,8 +22,10 @@ ROWS = 1 << 20
 class MonitorTable(Mapping[str, NDArray[np.float64]]):
     """The values of a pipeline's monitors: a column for each, beside `cycle` and `time`, a row for each time they ran.
 
-    It grows while the run goes on; a column that was taken out of it stays as it was. NaN where nothing could be
-    measured. Of more than 1 048 576 rows it keeps the newest.
+    It grows while the run goes on; a column that was taken out of it stays as it was: an array of shape (rows,),
+    float64, which cannot be written to. NaN where nothing could be measured. Of more than 1 048 576 rows it keeps the
+    newest. `time` is in the solver's unit of time, and values are in the units of the fields that they were measured
+    of.
 
     Examples
     --------
@@ -119,7 +121,18 @@ class MonitorTable(Mapping[str, NDArray[np.float64]]):
             return {name: float(column[self._end - 1]) for name, column in self._columns.items()}
 
     def to_pandas(self) -> Any:
-        """The table as a `pandas.DataFrame`, its rows by their cycle; needs pandas."""
+        """The table as a `pandas.DataFrame`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A copy, its rows by their cycle, with a column for `time` and one for each monitor.
+
+        Raises
+        ------
+        ImportError
+            There is no pandas.
+        """
         import pandas
 
         with self._lock:
@@ -156,10 +169,20 @@ class Monitors(Mapping[str, MonitorTable]):
         return len(self._tables)
 
     def to_pandas(self) -> Any:
-        """All monitors as one `pandas.DataFrame`: by cycle, columns called ``pipeline.monitor``; needs pandas.
+        """All monitors as one `pandas.DataFrame`.
 
         What was measured at one cycle and time is one row. A cycle that was counted anew, or shown more than once, has
         a row for each time.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A copy, its rows by their cycle, with columns called ``pipeline.monitor``.
+
+        Raises
+        ------
+        ImportError
+            There is no pandas.
         """
         import pandas
 

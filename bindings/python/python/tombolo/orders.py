@@ -120,6 +120,10 @@ class Order:
             It was rejected: nothing has changed. The text is the reason, and `report` has the feasible fraction.
         WaitError
             It did not come so far in time; it may still.
+        EndedError, LinkError
+            The run has ended before that, or the connection was lost for good.
+        ValueError
+            `until` is none of these.
         """
         return self._run._reader.carry_out(self._wait(timeout, until))
 
@@ -134,7 +138,18 @@ class Order:
         return self
 
     def cancel(self) -> Command:
-        """Take it back, where it has not begun to move the mesh."""
+        """Take it back, where it has not begun to move the mesh, and wait until that is done.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.cancel`.
+        """
         return self._run.cancel(self)
 
     def __repr__(self) -> str:
@@ -237,12 +252,24 @@ class Command:
     def wait(self, timeout: Optional[float] = None) -> Command:
         """Wait until it has taken effect; of `pause` and `resume`, until `Run.status` shows it too.
 
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        Command
+            This command.
+
         Raises
         ------
         RejectedError
             The run refuses it.
         WaitError
             It did not take effect in time; it may still.
+        EndedError, LinkError
+            The run has ended before that, unless the command is `stop`, or the connection was lost for good.
         """
         return self._run._reader.carry_out(self._wait(timeout, timeout))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, SupportsIndex, Union
 
 from . import _json
@@ -42,7 +42,8 @@ class Run(Watched):
     A thread of its own reads what the run tells, so that `status`, `views` and `monitors` are always the newest. A
     connection that is lost is made again with growing pauses. Any thread may use it. Every wait ends with Ctrl-C. It
     closes with `close`, at the end of a `with` block, once nothing refers to it any more, or with the interpreter; the
-    run itself goes on.
+    run itself goes on. Commands, questions and waits raise `CallError` once it was closed, and in a process that was
+    forked since.
 
     Attributes
     ----------
@@ -160,7 +161,8 @@ class Run(Watched):
         ----------
         edits : list of dict, dict or path
             The edits, or a whole order (`edits`, `stack` or `undo`, with its settings), or a JSON file of either.
-            Arrays of NumPy may stand in for lists of numbers.
+            Arrays of NumPy may stand in for lists of numbers. Lengths are in the unit of length of the mesh, angles in
+            degrees.
         schedule, deform, guard : dict, optional
             In how many steps the shape is reached; how the volume follows; what the mesh must keep to. Left out: what
             the run's configuration says.
@@ -169,12 +171,19 @@ class Run(Watched):
         deadline : int, optional
             Seconds that it may wait for its turn, where the run's configuration does not say less; it is rejected then.
 
+        Returns
+        -------
+        Order
+            The order, which has been sent.
+
         Raises
         ------
         ConfigurationError
             Something is wrong with it: the text has line, column, path and the nearest known name.
         NotDriverError
             Somebody else steers.
+        WaitError, EndedError, LinkError
+            As of `drive`.
 
         Examples
         --------
@@ -214,6 +223,11 @@ class Run(Watched):
         timeout : float, optional
             Seconds to wait for the wheel, and then for the answer, at most.
 
+        Returns
+        -------
+        Forecast
+            What the order would come to.
+
         Raises
         ------
         ConfigurationError
@@ -225,6 +239,8 @@ class Run(Watched):
             Somebody else steers.
         WaitError
             No answer came in time.
+        EndedError, LinkError
+            As of `drive`.
         """
         seconds(timeout)
         prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard))
@@ -239,19 +255,27 @@ class Run(Watched):
         return Forecast(data["order"])
 
     def undo(self, count: SupportsIndex = 1) -> Order:
-        """Take the last orders back; returns the order that does so.
+        """Take the last orders back.
 
         Parameters
         ----------
         count : int
             How many orders. The shape is the one before them then, to the bit.
 
+        Returns
+        -------
+        Order
+            The order that takes them back, which has been sent. What there is against it, such as fewer orders, is told
+            by its `Order.wait`.
+
         Raises
         ------
         ConfigurationError
             That is no number of orders.
         NotDriverError
-            Somebody else steers. What else there is against it, such as fewer orders, `Order.wait` says.
+            Somebody else steers.
+        WaitError, EndedError, LinkError
+            As of `drive`.
         """
         orders = whole(count, "count", 1)
         self.drive()
@@ -269,6 +293,11 @@ class Run(Watched):
         timeout : float, optional
             Seconds to wait, at most.
 
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
+
         Raises
         ------
         RejectedError
@@ -277,6 +306,8 @@ class Run(Watched):
             Somebody else steers.
         WaitError
             It did not take effect in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
         """
         identity = id_of(order, "order")
         return self._give(lambda: self._reader.client.cancel(identity), "cancel", wait, timeout)
@@ -289,11 +320,16 @@ class Run(Watched):
         parameter : str
             Its name.
         value : float
-            Its new value.
+            Its new value, in the unit that the solver has it in.
         wait : bool
             Whether to wait until the solver has it.
         timeout : float, optional
             Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
 
         Raises
         ------
@@ -305,20 +341,95 @@ class Run(Watched):
             Somebody else steers.
         WaitError
             The solver did not have it in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
         """
         given = number(value, f"parameter {parameter!r}")
         return self._give(lambda: self._reader.client.set(parameter, given), "set", wait, timeout)
 
     def pause(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
-        """Hold the solver at its next safe point."""
+        """Hold the solver at its next safe point.
+
+        Parameters
+        ----------
+        wait : bool
+            Whether to wait until it is held, and `status` shows it.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
+
+        Raises
+        ------
+        RejectedError
+            The run refuses it.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            It did not take effect in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
+        """
         return self._give(self._reader.client.pause, "pause", wait, timeout)
 
     def resume(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
-        """Let the solver go on."""
+        """Let the solver go on.
+
+        Parameters
+        ----------
+        wait : bool
+            Whether to wait until it goes on, and `status` shows it.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
+
+        Raises
+        ------
+        RejectedError
+            The run refuses it.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            It did not take effect in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
+        """
         return self._give(self._reader.client.resume, "resume", wait, timeout)
 
     def stop(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
-        """Ask the solver to end."""
+        """Ask the solver to end.
+
+        Parameters
+        ----------
+        wait : bool
+            Whether to wait until the solver has been told.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
+
+        Raises
+        ------
+        RejectedError
+            The run refuses it.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            It did not take effect in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
+            A run that ends before it has answered is no error.
+        """
         return self._give(self._reader.client.stop, "stop", wait, timeout)
 
     def change_pipelines(
@@ -334,6 +445,24 @@ class Run(Watched):
             Whether to wait until the change is made.
         timeout : float, optional
             Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect where that was waited for.
+
+        Raises
+        ------
+        ConfigurationError
+            Something is wrong with the change: the text has line, column, path and the nearest known name.
+        RejectedError
+            The run refuses it, and says why.
+        NotDriverError
+            Somebody else steers.
+        WaitError
+            It did not take effect in time; it may still.
+        EndedError, LinkError
+            As of `drive`.
         """
         text = _json.text(change, "pipelines")
         return self._give(lambda: self._reader.client.change_pipelines(text), "pipelines", wait, timeout)
@@ -349,7 +478,7 @@ class Run(Watched):
     # ---- Elsewhere.
 
     def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
-        """Make a link for somebody else. It opens one browser, once.
+        """Make a link for somebody else. It opens one browser, once, and lets no program in.
 
         Parameters
         ----------
@@ -366,8 +495,14 @@ class Run(Watched):
 
         Raises
         ------
+        ConfigurationError
+            The rights are none of these.
         RejectedError
             This client may not give such a link.
+        WaitError
+            None came in time.
+        EndedError, LinkError
+            The run has ended, or the connection was lost for good.
         """
         patience = seconds(timeout)
         return self._ask(lambda client: client.link_for(rights, patience))
@@ -386,7 +521,18 @@ class Run(Watched):
         self.close()
 
     def plot(self, pipeline: str, monitor: str) -> Plot:
-        """A monitor as a picture that a notebook shows; `Plot.live` has it grow while the run goes on."""
+        """A monitor as a picture that a notebook shows; `Plot.live` has it grow while the run goes on.
+
+        Parameters
+        ----------
+        pipeline, monitor : str
+            The monitor, and the pipeline that it is one of.
+
+        Returns
+        -------
+        tombolo.jupyter.Plot
+            The plot. Where there is no such monitor, to show it is a `KeyError`.
+        """
         from .jupyter import Plot
 
         return Plot(self, pipeline, monitor)
@@ -416,7 +562,7 @@ def connect(
     link: Union[str, os.PathLike[str]],
     *,
     watch: bool = False,
-    views: bool = True,
+    views: Union[bool, Sequence[str]] = True,
     attempts: SupportsIndex = 10,
     timeout: Optional[float] = None,
 ) -> Run:
@@ -425,11 +571,13 @@ def connect(
     Parameters
     ----------
     link : str or path
-        The link that the run has printed, or the file ``tombolo-PORT.link`` that holds it.
+        The run's `Adaptor.link`, or `Adaptor.watching_link` to watch only; or the file ``tombolo-PORT.link`` that holds
+        both, of which the first counts: the one for driving. A link for programs has a token in it (``?token=``). One
+        with ``?key=``, which a run prints on a terminal, opens one browser, once, and lets no program in.
     watch : bool
         Whether to only watch: never to have the wheel.
-    views : bool
-        Whether the frames of the live views are wanted.
+    views : bool or list of str
+        Whether the frames of the live views are wanted, or the names of those that are: see `Run.choose_views`.
     attempts : int
         How often a connection that is lost is tried to be made again, with growing pauses: 10 take about a minute.
     timeout : float, optional
@@ -468,4 +616,15 @@ def connect(
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
     retries, patience = whole(attempts, "attempts", 0), None if timeout is None else seconds(timeout)
-    return Run(text, watch=watch, views=views, attempts=retries, timeout=patience)
+    # A text would be taken for a list of letters.
+    if isinstance(views, str):
+        raise TypeError(f"views: found the text {views!r}, expected True, False or a list of names")
+    has_views = views if isinstance(views, bool) else bool(views)
+    run = Run(text, watch=watch, views=has_views, attempts=retries, timeout=patience)
+    if has_views and not isinstance(views, bool):
+        try:
+            run.choose_views(views)
+        except BaseException:
+            run.close()
+            raise
+    return run

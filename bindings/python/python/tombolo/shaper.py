@@ -34,7 +34,7 @@ class Shape(NamedTuple):
     Attributes
     ----------
     points : array of shape (n, 2) or (n, 3)
-        The coordinates of each vertex, in as many columns as the mesh was given with.
+        The coordinates of each vertex in the unit of length of the mesh, in as many columns as it was given with.
     fraction : float
         The fraction of the edits that was done: below 1 where the guard clamped them.
     min_scaled_jacobian : float or None
@@ -42,7 +42,8 @@ class Shape(NamedTuple):
     quality : dict
         The scaled Jacobian in the end: `min`, `mean`, `max`, how many cells are `inverted`, the `worst` of them, ...
     details : dict
-        All of that, and how it was found: `iterations`, `sub_steps`, `largest_displacement`, `seconds`.
+        All of that, and how it was found: `iterations`, `sub_steps`, `largest_displacement` in the unit of length of
+        the mesh, `seconds`.
     """
 
     points: NDArray[np.float64]
@@ -62,9 +63,9 @@ class Skeleton(NamedTuple):
     Attributes
     ----------
     nodes : array of shape (k, 3), float64
-        The coordinates of each node.
+        The coordinates of each node, in the unit of length of the mesh.
     radii : array of shape (k,), float64
-        How far the surface is from each node, in units of the mesh.
+        How far the surface is from each node, in the same unit.
     curves : list of arrays, uint32
         The nodes of each curve, from end to end; a closed one ends with its first.
     node_of_vertex : array of shape (b,), uint32
@@ -271,7 +272,10 @@ class Shaper:
 
     @property
     def features(self) -> list[dict[str, Any]]:
-        """The named parts of the surface, each with `name`, `faces`, `vertices`, `area` and `bounds`."""
+        """The named parts of the surface, each with `name`, `faces`, `vertices`, `area` and `bounds`.
+
+        The bounds are in the unit of length of the mesh, the area in its square.
+        """
         features: list[dict[str, Any]] = _json.loads(self._shaper.features())
         return features
 
@@ -281,7 +285,27 @@ class Shaper:
         return Surface(**self._shaper.surface())
 
     def skeleton(self, *, progress: Optional[Progress] = None) -> Skeleton:
-        """Find the curve skeleton of the surface, on which an edit `skeleton` drags nodes."""
+        """Find the curve skeleton of the surface, on which an edit `skeleton` drags nodes.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            As of `shape`.
+
+        Returns
+        -------
+        Skeleton
+            The curves with their nodes.
+
+        Raises
+        ------
+        MeshError
+            The surface has no skeleton: the text says why.
+        RejectedError
+            `cancel` gave it up.
+        CallError
+            Another thread is in a call of this shaper.
+        """
         return Skeleton(**self._work(self._shaper.skeleton, progress))
 
     def quality(self, points: Optional[ArrayLike] = None) -> dict[str, Any]:
@@ -290,14 +314,14 @@ class Shaper:
         Parameters
         ----------
         points : array of shape (n, 2) or (n, 3), optional
-            A coordinate for each vertex of the mesh, in as many columns as the mesh was given with. Left out: the
-            mesh as it is.
+            The coordinates of each vertex in the unit of length of the mesh, in as many columns as it was given with.
+            Left out: the mesh as it is.
 
         Returns
         -------
         dict
             `min`, `mean`, `max`, how many cells are `inverted`, a `histogram` of 20 classes from -1 to 1, and the
-            `worst` cells. Of a mesh with volume cells it is that of those.
+            `worst` cells. In a mesh with volume cells only these are measured.
 
         Raises
         ------
@@ -335,12 +359,18 @@ class Shaper:
         Parameters
         ----------
         edits : list of dict, dict or path
-            The edits, or an order with its settings, or a JSON file of either.
+            The edits, or an order with its settings, or a JSON file of either. Lengths are in the unit of length of the
+            mesh, angles in degrees.
         progress : callable, optional
             Called at once, and then about ten times a second, with the seconds so far.
         **settings : dict
             `deform`: how the volume follows; `guard`: what the mesh must keep to; `schedule`: in how many shapes the
             way is looked at.
+
+        Returns
+        -------
+        Shape
+            The points of the mesh in its new shape, and its quality.
 
         Raises
         ------
@@ -348,7 +378,9 @@ class Shaper:
             Something is wrong with the edits, with line, column and path.
         RejectedError
             The mesh would be broken, or one of two coordinates would leave its plane. The text says where; `report` has
-            the fraction that would pass.
+            the fraction that would pass. Or `cancel` gave it up.
+        CallError
+            Another thread is in a call of this shaper.
         """
         text, name = _order(edits, settings)
         points, told = self._work(lambda: self._shaper.shape(text, name), progress)
@@ -356,20 +388,52 @@ class Shaper:
         return Shape(points, details["fraction"], details["min_scaled_jacobian"], details["quality"], details)
 
     def forecast(self, edits: Edits, *, progress: Optional[Progress] = None, **settings: Mapping[str, Any]) -> Forecast:
-        """Find out what edits would come to, also where they would be rejected. Parameters as of `shape`."""
+        """Find out what edits would come to, also where they would be rejected. Parameters are as of `shape`.
+
+        Returns
+        -------
+        Forecast
+            What they would come to. Where `cancel` gave it up, it is `rejected`, and the reason says so.
+
+        Raises
+        ------
+        ConfigurationError, CallError
+            As of `shape`.
+        """
         text, name = _order(edits, settings)
         return Forecast(_json.loads(self._work(lambda: self._shaper.forecast(text, name), progress)))
 
     def displacement(self, edits: Edits, *, progress: Optional[Progress] = None) -> NDArray[np.float64]:
-        """Find how far edits move each vertex of the surface: a row `(x, y, z)` for each of `surface.points`.
+        """Find how far edits move each vertex of the surface.
 
         An edit ``{"displacement": {"vertices": surface.vertices, "values": ...}}`` takes it again.
+
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            As of `shape`.
+        progress : callable, optional
+            As of `shape`.
+
+        Returns
+        -------
+        array of shape (b, 3), float64
+            A row `(x, y, z)` for each of `surface.points`, in the unit of length of the mesh.
+
+        Raises
+        ------
+        ConfigurationError
+            Something is wrong with the edits, with line, column and path.
+        RejectedError
+            The edits cannot be carried out: the text says why. Or `cancel` gave it up.
+        CallError
+            Another thread is in a call of this shaper.
         """
         text, name = _json.order(edits, {})
         return self._work(lambda: self._shaper.displacement(text, name), progress)
 
     def cancel(self) -> None:
-        """Have the work under way given up, from any thread: it raises `RejectedError`."""
+        """Have the work under way given up, from any thread: it raises `RejectedError`, or forecasts a rejection."""
         self._shaper.cancel()
 
     def _work(self, call: Callable[[], Result], progress: Optional[Progress]) -> Result:

@@ -25,7 +25,7 @@ class Status(NamedTuple):
     cycle : int
         The last step that it told.
     time : float
-        The simulated time, in the solver's unit.
+        The simulated time, in the solver's unit of time.
     paused, stopped : bool
         Whether it waits to be resumed; whether it was asked to stop.
     step_seconds : float or None
@@ -66,7 +66,10 @@ class Status(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """A number of the solver that can be steered: its value now, and the least and greatest it may take."""
+    """A number of the solver that can be steered: its value now, and the least and greatest it may take.
+
+    All three are in the unit that the solver has it in.
+    """
 
     value: float
     minimum: float
@@ -101,6 +104,8 @@ class State:
         self.end: Optional[dict[str, Any]] = None
         self.monitors = Monitors()
         self.views: dict[str, View] = {}
+        # The triangles, lines and features of each view, which come once as long as they stay the same.
+        self._cells: dict[str, tuple[Any, Any, Any]] = {}
         # The names of views that were there once.
         self.removed: set[str] = set()
         self.orders: OrderedDict[str, dict[str, Any]] = OrderedDict()
@@ -136,6 +141,7 @@ class State:
             back = self.removed & now
             for name in gone | back:
                 self.views.pop(name, None)
+                self._cells.pop(name, None)
             self.removed = (self.removed | gone) - now
             self.hello = data
         elif kind == "status":
@@ -170,13 +176,10 @@ class State:
 
     def _view(self, frame: dict[str, Any]) -> View:
         name = frame["view"]
-        before = self.views.get(name)
-        if "triangles" in frame or before is None:
-            triangles = frame.get("triangles", np.empty((0, 3), np.uint32))
-            lines = frame.get("lines", np.empty((0, 2), np.uint32))
-            features = frame.get("features")
-        else:
-            triangles, lines, features = before.triangles, before.lines, before.features
+        if "triangles" in frame or name not in self._cells:
+            none = np.empty((0, 3), np.uint32), np.empty((0, 2), np.uint32)
+            self._cells[name] = frame.get("triangles", none[0]), frame.get("lines", none[1]), frame.get("features")
+        triangles, lines, features = self._cells[name]
         fields = {field: values for field, _, values in frame["fields"]}
         for array in (frame["points"], triangles, lines, features, *fields.values()):
             if array is not None:

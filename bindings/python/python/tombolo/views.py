@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple, Optional
 
 import numpy as np
@@ -15,6 +15,13 @@ __all__ = ["Surface", "View", "Views"]
 
 #: What is said where frames were not asked for.
 NOT_WANTED = "no frames of views come: the run was connected with views=False"
+
+
+def not_chosen(name: str) -> str:
+    """Say that a view was not chosen."""
+    return f"no frames of the view '{name}' come: it was not chosen by run.choose_views"
+
+
 #: What meshio calls faces of so many vertices.
 _POLYGONS = {3: "triangle", 4: "quad"}
 
@@ -34,9 +41,9 @@ class View(NamedTuple):
     cycle : int
         The step.
     time : float
-        The simulated time, in the solver's unit.
+        The simulated time, in the solver's unit of time.
     points : array of shape (n, 3), float64
-        The coordinates of each point.
+        The coordinates of each point, in the unit of length of the mesh.
     triangles : array of shape (t, 3), uint32
         Triangles by the numbers of their points.
     lines : array of shape (l, 2), uint32
@@ -45,7 +52,7 @@ class View(NamedTuple):
         The feature of each triangle, where the view has features: an index into `Run.features`.
     fields : dict of str to array
         `(n,)` or `(n, k)` at points; of elements a value for each triangle, then for each line. Numbers are within the
-        bound that the view's `stream` stage states.
+        bound that the view's `stream` stage states, in the unit of the solver's field.
     associations : dict of str to {"vertex", "element"}
         Where the values of each field are.
     """
@@ -61,7 +68,18 @@ class View(NamedTuple):
     associations: dict[str, Literal["vertex", "element"]]
 
     def to_pyvista(self) -> Any:
-        """The view as a `pyvista.PolyData`, lines before triangles as VTK keeps them; needs PyVista."""
+        """The view for PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            A copy; in its cell data lines stand before triangles, as VTK keeps them.
+
+        Raises
+        ------
+        ImportError
+            There is no PyVista.
+        """
         import pyvista
 
         from . import vtk
@@ -69,7 +87,18 @@ class View(NamedTuple):
         return pyvista.wrap(vtk.of_view(self))
 
     def to_meshio(self) -> Any:
-        """The view as a `meshio.Mesh`; needs meshio."""
+        """The view for meshio.
+
+        Returns
+        -------
+        meshio.Mesh
+            A copy, with a block of triangles and one of lines, where there are any.
+
+        Raises
+        ------
+        ImportError
+            There is no meshio.
+        """
         import meshio
 
         count = len(self.triangles)
@@ -104,13 +133,22 @@ class Views(Mapping[str, View]):
         The frames, which change while the run goes on.
     announced : callable
         Returns the names of the live views.
+    chosen : callable
+        Returns the names of those that were chosen, None for all.
     wanted : bool
         Whether frames come at all.
     """
 
-    def __init__(self, frames: Mapping[str, View], announced: Callable[[], Sequence[str]], wanted: bool = True) -> None:
+    def __init__(
+        self,
+        frames: Mapping[str, View],
+        announced: Callable[[], Sequence[str]],
+        chosen: Callable[[], Optional[Collection[str]]],
+        wanted: bool = True,
+    ) -> None:
         self._frames = frames
         self._announced = announced
+        self._chosen = chosen
         self._wanted = wanted
 
     def __getitem__(self, name: str) -> View:
@@ -119,14 +157,19 @@ class Views(Mapping[str, View]):
         names = self._announced()
         if name not in names:
             raise KeyError(unknown("view", name, names))
+        chosen = self._chosen()
+        if chosen is not None and name not in chosen:
+            raise KeyError(not_chosen(name))
         frame = self._frames.get(name)
         if frame is None:
             raise KeyError(f"no frame of the view '{name}' has come yet; run.wait_for_view({name!r}) waits for it")
         return frame
 
     def __iter__(self) -> Iterator[str]:
-        # A frame of a view that was removed may have been on its way.
-        return iter([name for name in self._announced() if name in self._frames])
+        # A frame of a view that was removed, or is looked at no more, may have been on its way.
+        chosen = self._chosen()
+        names = [name for name in self._announced() if chosen is None or name in chosen]
+        return iter([name for name in names if name in self._frames])
 
     def __len__(self) -> int:
         return len(list(iter(self)))
@@ -142,7 +185,7 @@ class Surface(NamedTuple):
     Attributes
     ----------
     points : array of shape (n, 3), float64
-        The coordinates of each of its vertices.
+        The coordinates of each of its vertices, in the unit of length of the mesh.
     vertices : array of shape (n,), uint32
         Which vertex of the mesh each is.
     connectivity : array of uint32
@@ -163,13 +206,40 @@ class Surface(NamedTuple):
     names: list[str]
 
     def faces_of(self, feature: str) -> NDArray[np.int64]:
-        """The numbers of a feature's faces, as the region `faces` of an edit takes them."""
+        """The numbers of a feature's faces, as the region `faces` of an edit takes them.
+
+        Parameters
+        ----------
+        feature : str
+            The name of the feature, one of `names`.
+
+        Returns
+        -------
+        array of shape (k,), int64
+            The numbers of its faces, counted from 0.
+
+        Raises
+        ------
+        KeyError
+            There is no such feature.
+        """
         if feature not in self.names:
             raise KeyError(unknown("feature", feature, self.names))
         return np.flatnonzero(self.features == self.names.index(feature))
 
     def to_pyvista(self) -> Any:
-        """The surface as a `pyvista.PolyData` with the cell array `features`; needs PyVista."""
+        """The surface for PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            A copy, with the cell array `features` and the point array `vertices`.
+
+        Raises
+        ------
+        ImportError
+            There is no PyVista.
+        """
         import pyvista
 
         from . import vtk
@@ -177,7 +247,18 @@ class Surface(NamedTuple):
         return pyvista.wrap(vtk.of_surface(self))
 
     def to_meshio(self) -> Any:
-        """The surface as a `meshio.Mesh` with the cell data `features` and their names; needs meshio."""
+        """The surface for meshio.
+
+        Returns
+        -------
+        meshio.Mesh
+            A copy, with the cell data `features`, their names, and the point data `vertices`.
+
+        Raises
+        ------
+        ImportError
+            There is no meshio.
+        """
         import meshio
 
         sizes = np.diff(self.offsets)

@@ -67,14 +67,37 @@ def array(attributes: Any, name: str) -> Optional[NDArray[Any]]:
 
 
 def add(attributes: Any, name: str, values: ArrayLike) -> None:
-    """Add a copy of an array `(n,)` or `(n, k)` to what `GetPointData`, `GetCellData` or `GetFieldData` returns."""
+    """Add a copy of an array.
+
+    Parameters
+    ----------
+    attributes : vtkFieldData
+        What `GetPointData`, `GetCellData` or `GetFieldData` of a data object returns.
+    name : str
+        The name of the array; one of that name makes way.
+    values : array of shape (n,) or (n, k)
+        Its numbers.
+    """
     made = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
     made.SetName(name)
     attributes.AddArray(made)
 
 
 def texts(data: Any, name: str) -> Optional[list[str]]:
-    """Find the texts that stand under a name in the field data of a data object; None where there are none."""
+    """Find the texts that stand under a name in the field data of a data object.
+
+    Parameters
+    ----------
+    data : vtkDataObject
+        The data object.
+    name : str
+        The name of the texts.
+
+    Returns
+    -------
+    list of str, or None
+        The texts; None where there are none.
+    """
     found = data.GetFieldData().GetAbstractArray(name)
     if found is None or not found.IsA("vtkStringArray"):
         return None
@@ -82,7 +105,17 @@ def texts(data: Any, name: str) -> Optional[list[str]]:
 
 
 def set_texts(data: Any, name: str, values: Sequence[str]) -> None:
-    """Put texts into the field data of a data object, in place of what has the name there."""
+    """Put texts into the field data of a data object, in place of what has the name there.
+
+    Parameters
+    ----------
+    data : vtkDataObject
+        The data object.
+    name : str
+        The name of the texts.
+    values : sequence of str
+        The texts.
+    """
     made = vtkStringArray()
     made.SetName(name)
     for value in values:
@@ -169,7 +202,18 @@ def of_surface(surface: Surface) -> Any:
 
 
 def of_skeleton(skeleton: Skeleton) -> Any:
-    """Make a `vtkPolyData` of a curve skeleton: a polyline for each curve, and the point array `radius`."""
+    """Make polylines of a curve skeleton.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        That of a `Shaper`.
+
+    Returns
+    -------
+    vtkPolyData
+        A polyline for each curve, and the point array `radius` in the unit of length of the mesh.
+    """
     made = vtkPolyData()
     made.SetPoints(_points(skeleton.nodes))
     if skeleton.curves:
@@ -183,7 +227,18 @@ def of_skeleton(skeleton: Skeleton) -> Any:
 
 
 def points(data: Any) -> NDArray[Any]:
-    """Find the points of a `vtkPointSet`, `(n, 3)`: a view of VTK's memory."""
+    """Find the points of a data object.
+
+    Parameters
+    ----------
+    data : vtkPointSet
+        The data object.
+
+    Returns
+    -------
+    array of shape (n, 3)
+        A view of VTK's memory, in the unit of length that the data object has.
+    """
     found = data.GetPoints()
     return np.empty((0, 3)) if found is None else np.asarray(vtk_to_numpy(found.GetData()))
 
@@ -202,6 +257,12 @@ def to_mesh(data: Any) -> Mesh:
         Its points and cells, without its fields. Features are those of the cell array `features`, else those of the
         point array `features`. Their names are the texts `feature_names`, or those of arrays ``[number, 2]`` in the
         field data.
+
+    Raises
+    ------
+    MeshError
+        It has no cells, or cells that make no mesh, such as polyhedra and cells with vertices on their edges; or the
+        number of a feature is not whole.
     """
     grid = data
     if not data.IsA("vtkUnstructuredGrid"):
@@ -292,7 +353,17 @@ def shaper(data: Any, *, angle: Optional[float] = None) -> Shaper:
     data : vtkDataSet
         As `to_mesh` takes it.
     angle : float, optional
-        As `Shaper` takes it.
+        As `Shaper` takes it, in degrees.
+
+    Returns
+    -------
+    Shaper
+        The shaper, which others that asked for the same have too.
+
+    Raises
+    ------
+    MeshError
+        As of `to_mesh` and `Shaper`.
     """
     mesh = to_mesh(data)
     assert isinstance(mesh.cells, dict)
