@@ -25,6 +25,8 @@ const NUMBERS: [&str; 18] = [
     "18446744073709551615",
     "NaN",
 ];
+/// Values of a list, and bytes of a text, that are made by repetition.
+const LARGEST: usize = 1 << 20;
 /// The depth of what is nested by chance.
 const DEPTH: usize = 300;
 
@@ -155,13 +157,16 @@ fn value_damage(value: &mut Value, other: &Value, random: &mut Random) {
                     1 => items.insert(at, taken()),
                     _ => {
                         let last = items.last().cloned();
-                        items.extend(std::iter::repeat_n(last, random.below(400)).flatten());
+                        let most = LARGEST / last.as_ref().map_or(1, nodes);
+                        let count = random.below(400).min(most);
+                        items.extend(std::iter::repeat_n(last, count).flatten());
                     }
                 }
             }
             Value::Object(members) => object(members, &taken(), random),
             Value::String(text) => {
-                let most = 1 << random.below(12);
+                // What grows from pass to pass must not grow for ever.
+                let most = (1 << random.below(12)).min(LARGEST / text.len().max(1));
                 *text = text.repeat(1 + random.below(most));
             }
             _ => *node = json!(MARK),

@@ -12,10 +12,12 @@
 //! readers without an instrumented compiler.
 //!
 //! Each input is written to a file before it is read, so that one that ends the process is there
-//! too. `corpus/TARGET/` holds the inputs that once did harm; every pass begins with them.
+//! too. `corpus/TARGET.zst` holds inputs of before: each had an outcome that none before it had, or did
+//! harm once. Every pass begins with them and goes on from them; [`fuzz`] can add its own.
 #![warn(missing_docs)]
 
 mod client;
+mod corpus;
 mod damage;
 mod meshes;
 mod random;
@@ -65,15 +67,6 @@ pub struct Fault {
     pub file: PathBuf,
 }
 
-/// The inputs that once did harm, by their files.
-fn corpus(target: Target) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target.name());
-    let mut files: Vec<PathBuf> =
-        fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
-    files.sort();
-    files.iter().filter_map(|file| fs::read(file).ok()).collect()
-}
-
 /// Reads one input; whether it did harm.
 struct Reading<'s> {
     target: Target,
@@ -102,11 +95,18 @@ impl Reading<'_> {
 }
 
 /// Has a target read damaged inputs for so long; the first that does harm is left in a file in
-/// `folder`.
+/// `folder`. Where it `adds` to the corpus, inputs with an outcome of their own are kept there, and
+/// those of before that have none any more are not.
 ///
 /// # Errors
-/// A [`Fault`]; a folder that cannot be written is one too.
-pub fn fuzz(target: Target, seed: u64, time: Duration, folder: &Path) -> Result<Pass, Fault> {
+/// A [`Fault`]; a folder or a corpus that cannot be read or written is one too.
+pub fn fuzz(
+    target: Target,
+    seed: u64,
+    time: Duration,
+    folder: &Path,
+    adds: bool,
+) -> Result<Pass, Fault> {
     let current = folder.join(format!("{}.input", target.name()));
     let fault = |reason: String| Fault { reason, file: current.clone() };
     let failed = |error: io::Error| fault(error.to_string());
@@ -116,9 +116,16 @@ pub fn fuzz(target: Target, seed: u64, time: Duration, folder: &Path) -> Result<
     let mut random = Random::new(seed);
     let mut kept = target.seeds(&seeds);
     let (mut seen, mut inputs) = (HashSet::new(), 0);
-    for input in corpus(target).iter().chain(&kept) {
+    for input in &kept {
         seen.insert(reading.outcome(input).map_err(fault)?);
         inputs += 1;
+    }
+    let own = kept.len();
+    for input in corpus::read(target).map_err(failed)? {
+        inputs += 1;
+        if seen.insert(reading.outcome(&input).map_err(fault)?) {
+            kept.push(input);
+        }
     }
     let until = Instant::now() + time;
     while inputs < LEAST || Instant::now() < until {
@@ -133,6 +140,9 @@ pub fn fuzz(target: Target, seed: u64, time: Duration, folder: &Path) -> Result<
         if seen.insert(reading.outcome(&input).map_err(fault)?) && kept.len() < MOST_KEPT {
             kept.push(input);
         }
+    }
+    if adds {
+        corpus::write(target, kept.split_off(own)).map_err(failed)?;
     }
     Ok(Pass { inputs, outcomes: seen.len() })
 }

@@ -16,6 +16,9 @@ struct Arguments {
     /// Another number gives other inputs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Keep inputs with an outcome of their own in the corpus.
+    #[arg(long)]
+    keep: bool,
     /// The folder for the input that does harm.
     #[arg(long, default_value = "fuzz-found")]
     folder: PathBuf,
@@ -29,7 +32,7 @@ fn main() -> ExitCode {
     };
     let time = Duration::from_secs(arguments.seconds);
     for &target in targets {
-        match fuzz(target, arguments.seed, time, &arguments.folder) {
+        match fuzz(target, arguments.seed, time, &arguments.folder, arguments.keep) {
             Ok(pass) => {
                 println!("{}: {} inputs, {} outcomes", target.name(), pass.inputs, pass.outcomes)
             }

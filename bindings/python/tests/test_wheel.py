@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 from urllib.request import urlopen
@@ -29,6 +30,7 @@ def wheel():
 
 def test_a_wheel_needs_python_alone(wheel, tmp_path):
     assert wheel.stat().st_size <= 15e6
+    begun = time.monotonic()
     subprocess.run([sys.executable, "-m", "venv", tmp_path / "venv"], check=True)
     python = tmp_path / "venv/bin/python"
     subprocess.run([python, "-m", "pip", "install", "-q", "--no-index", "--no-deps", wheel], check=True)
@@ -48,6 +50,8 @@ def test_a_wheel_needs_python_alone(wheel, tmp_path):
         finally:
             process.kill()
     assert process.returncode == 0 and line, said
+    # From nothing to a link and a picture.
+    assert time.monotonic() - begun < 60
     (picture,) = tmp_path.glob("height-*.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
     told = subprocess.run([tmp_path / "venv/bin/tombolo", "--version"], check=True, capture_output=True, text=True)
