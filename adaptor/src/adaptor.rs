@@ -287,7 +287,7 @@ impl Adaptor {
     ///
     /// Where no pipeline is due, no command has arrived and no motion is under way, it costs one
     /// atomic load and a few comparisons and allocates nothing; on several ranks also one reduction
-    /// of six numbers, at every call or, where the configuration says so (`steering.poll_steps`),
+    /// of seven numbers, at every call or, where the configuration says so (`steering.poll_steps`),
     /// at every so many. It waits for nobody, except while it is paused, and for the plans of
     /// orders that take effect at a given cycle.
     ///

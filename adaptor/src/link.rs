@@ -141,6 +141,7 @@ impl Link {
         role: Option<&str>,
         client: Option<&str>,
         back: Option<&str>,
+        looks: bool,
     ) -> String {
         let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
         if let Some(role) = role {
@@ -148,6 +149,9 @@ impl Link {
         }
         if let Some(back) = back {
             client += &format!("&back={back}");
+        }
+        if !looks {
+            client += "&views=none";
         }
         format!("ws://{}{}{client}", self.authority(), self.path("ws"))
     }
@@ -261,14 +265,17 @@ mod tests {
         let read = |text: &str| text.parse::<Link>();
         let link = read(" http://[::1]:7070/?token=abc\n").expect("a link");
         assert_eq!(
-            (link.name(), &*link.socket(None, None, None)),
+            (link.name(), &*link.socket(None, None, None, true)),
             ("::1", "ws://[::1]:7070/ws?token=abc")
         );
         assert_eq!(link.opened_by("?key=k"), "http://[::1]:7070/?key=k");
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
         assert_eq!(link.opened_by("?key=k"), "http://host/a/b/?key=k");
         assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
-        assert_eq!(link.socket(None, Some("c3"), None), "ws://host:80/a/b/ws?token=t-1&client=c3");
+        assert_eq!(
+            link.socket(None, Some("c3"), None, true),
+            "ws://host:80/a/b/ws?token=t-1&client=c3"
+        );
         assert!(!format!("{link:?}").contains("t-1"));
         let digits = "0A".repeat(32);
         let pinned = format!("https://host/?token=t-1#sha256={digits}");

@@ -6,6 +6,7 @@ use std::{path::Path, time::Duration};
 
 use common::{Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
+use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
     Settings,
     client::{Client, Link, Options},
@@ -162,6 +163,10 @@ fn viewers_go_through_a_recording() {
     assert!(error["message"].as_str().unwrap().contains("recording"), "{error}");
     viewer.send(&json!({"id": "y", "play": {"speed": 0}}));
     viewer.wait_for("error", |error| error["id"] == "y");
+    // An id that is no text is not told back: around it, what is told would be too deep to be read.
+    let deep = format!("{}1{}", "[".repeat(126), "]".repeat(126));
+    viewer.send_message(Message::text(format!(r#"{{"id": {deep}, "play": {{}}}}"#)));
+    viewer.wait_for("error", |error| error["id"].is_null());
     // To its end, faster.
     viewer.send(&json!({"play": {"speed": 100}}));
     viewer.wait_for("play", |play| play["at_end"] == true);

@@ -123,27 +123,36 @@ def _vertices(data):
     return vertices
 
 
-def _fingerprint(moved):
-    return hashlib.blake2b(np.ascontiguousarray(moved), digest_size=16).hexdigest()
+def _fingerprint(vertices, moved):
+    """That of a displacement of vertices, in whatever order and how often each of them comes."""
+    vertices, first = np.unique(vertices, return_index=True)
+    made = hashlib.blake2b(vertices.astype(np.int64), digest_size=16)
+    made.update(np.ascontiguousarray(moved[first]))
+    return made.hexdigest()
 
 
 def _set_edits(data, edits, moved=None):
     """Has edits come with the output, and the fingerprint of the displacement that they make."""
     texts = [json.dumps(edits)]
-    vtk.set_texts(data, "edits", texts if moved is None else [*texts, _fingerprint(moved)])
+    vtk.set_texts(data, "edits", texts if moved is None else [*texts, _fingerprint(_vertices(data), moved)])
 
 
 def _edits(data):
     """The edits that come with the input; none where its displacement is another than they make."""
     text, *fingerprints = vtk.texts(data, "edits") or ["[]"]
     edits = json.loads(text)
-    # A filter of ParaView may have put another array in its place.
-    is_theirs = not edits or fingerprints == [_fingerprint(_displacement(data, "displacement"))]
-    return edits if is_theirs else []
+    if not edits or not data.GetPointData().HasArray("displacement"):
+        return []
+    # A filter of ParaView may have put another array in its place, or left points out.
+    own = _fingerprint(_vertices(data), _displacement(data, "displacement"))
+    return edits if fingerprints == [own] else []
 
 
 def _as_edits(vertices, moved):
     """A displacement as an edit of the vertices that move; none where nothing does."""
+    # Filters that part faces have a vertex more than once.
+    vertices, first = np.unique(vertices, return_index=True)
+    moved = moved[first]
     kept = np.flatnonzero(np.any(moved != 0, axis=1))
     if len(kept) == 0:
         return []
@@ -338,6 +347,7 @@ class TomboloRun(_Source):
             return None
         names = run.view_names
         if self.view and names and self.view not in names:
+            del self._held[1:]
             return f"no view '{self.view}'; there are: {', '.join(names)}"
         name = self.view or next(iter(names), "")
         if [look.view for look in self._held[1:]] != [name]:

@@ -1,4 +1,4 @@
-//! Inputs that are kept: each had an outcome that none before it had, or did harm once.
+//! Inputs that are kept: each had an outcome that none before it had.
 //!
 //! Those of a target lie in one file, `corpus/TARGET.zst`: behind each other, each behind its length in
 //! four bytes, little endian. They are much alike, so that together they take little.

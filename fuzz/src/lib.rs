@@ -12,8 +12,8 @@
 //! readers without an instrumented compiler.
 //!
 //! Each input is written to a file before it is read, so that one that ends the process is there
-//! too. `corpus/TARGET.zst` holds inputs of before: each had an outcome that none before it had, or did
-//! harm once. Every pass begins with them and goes on from them; [`fuzz`] can add its own.
+//! too. `corpus/TARGET.zst` holds inputs of before: each had an outcome that none before it had. Every
+//! pass begins with them and goes on from them; [`fuzz`] can add its own.
 #![warn(missing_docs)]
 
 mod client;

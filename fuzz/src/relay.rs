@@ -270,7 +270,9 @@ impl Watching {
                 return Ok(None);
             }
         }
-        let id = serde_json::from_str::<Value>(text).ok().and_then(|said| said.get("id").cloned());
+        let said = serde_json::from_str::<Value>(text).unwrap_or_default();
+        // One that is no text is not told back.
+        let id = said.get("id").filter(|id| id.is_string());
         let until = Instant::now() + PATIENCE;
         let mut outcome = "obeyed".to_owned();
         while Instant::now() < until {
@@ -291,7 +293,7 @@ impl Watching {
                     let message = error["message"].as_str().unwrap_or_default();
                     // The player has not come to what was said before.
                     let is_late = error["id"].is_null() && message.contains("messages that wait");
-                    if !is_late && id.as_ref().is_some_and(|id| *id != error["id"]) {
+                    if !is_late && id.is_some_and(|id| *id != error["id"]) {
                         return Err(format!("it is told of another message: {error}"));
                     }
                     outcome = message.to_owned();

@@ -149,6 +149,22 @@ fn what_follows_from_an_error_alone_is_not_told() {
 }
 
 #[test]
+fn what_is_beyond_a_limit_is_told_and_not_made() {
+    // Each would have as many monitors as it has bins or samples.
+    let text = r#"{"version": 1, "pipelines": [{"name": "a", "stages": [
+        {"statistics": {"field": "p"}},
+        {"histogram": {"field": "p", "name": "h", "bins": 4294967295}},
+        {"spectrum": {"monitor": "p.max", "name": "s", "samples": 4294967295}}], "when": "h.lower > 0", "then": [{"stop": {}}]}]}"#;
+    let told = told(text);
+    assert!(
+        told.contains("histogram.bins: found 4294967295 bins, expected at most 1024"),
+        "{told}"
+    );
+    assert!(told.contains("spectrum.samples: found 4294967295"), "{told}");
+    assert_eq!(told.lines().count(), 2, "{told}");
+}
+
+#[test]
 fn all_errors_of_orders_are_told() {
     assert_told(
         &told_of_orders(

@@ -1,6 +1,6 @@
 //! The client's thread: it connects, reads, sends, and connects again.
 
-use std::{sync::Arc, time::Duration};
+use std::{collections::BTreeSet, sync::Arc, time::Duration};
 
 use axum::http::{HeaderValue, header};
 use futures_util::{SinkExt, StreamExt};
@@ -130,8 +130,9 @@ async fn join(link: &Link, options: &Options, shared: &Shared) -> Result<Socket,
             wrong(format!("no answer within {} seconds", HELLO.as_secs()))
         }
     };
+    let looks = shared.with(|state| state.chosen.as_ref().is_none_or(|names| !names.is_empty()));
     let mut request = link
-        .socket(options.drives.role(), name, back)
+        .socket(options.drives.role(), name, back, looks)
         .into_client_request()
         .map_err(|error| wrong(error.to_string()))?;
     if let Ok(value) = HeaderValue::from_str(&format!("Bearer {}", link.token())) {
@@ -193,6 +194,11 @@ fn is_end(error: &Error) -> bool {
     }
 }
 
+/// The message that chooses views.
+pub(super) fn choice(names: Option<&BTreeSet<String>>) -> String {
+    json!({"views": {"names": names}}).to_string()
+}
+
 /// The first text; the close frame where there is none.
 async fn first_text(socket: &mut Socket) -> Result<String, Option<CloseFrame>> {
     loop {
@@ -209,25 +215,21 @@ async fn first_text(socket: &mut Socket) -> Result<String, Option<CloseFrame>> {
 async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Over {
     let mut decoder = Decoder::new();
     let (mut frames, mut acknowledged) = (0_u64, 0_u64);
-    // The views that the run sends: all, until it is told.
-    let mut chosen = None;
     let mut regain = tokio::time::interval(REGAIN);
     let mut heard = Instant::now();
     loop {
         // One that asks for no views acknowledges the first frame alone: no more than two of each
         // view are on their way to it, before the run has heard that.
-        let (unsent, taken, closing, wanted) =
-            shared.with(|state| (state.unsent(), state.taken, state.closing, state.chosen.clone()));
+        let (unsent, taken, closing, choices) = shared.with(|state| {
+            (state.unsent(), state.taken, state.closing, std::mem::take(&mut state.choices))
+        });
         let count = if options.views { taken.clamp(1, frames.max(1)) } else { 1 };
         let mut messages: Vec<Message> = unsent.into_iter().map(Message::text).collect();
         if frames > 0 && count > acknowledged {
             acknowledged = count;
             messages.push(Message::binary(count.to_le_bytes().to_vec()));
         }
-        if wanted != chosen {
-            messages.push(Message::text(json!({"views": {"names": wanted}}).to_string()));
-            chosen = wanted;
-        }
+        messages.extend(choices.iter().map(|names| Message::text(choice(names.as_ref()))));
         for message in messages {
             match timeout(WRITE, socket.send(message)).await {
                 Ok(Ok(())) => {}

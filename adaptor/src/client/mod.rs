@@ -60,8 +60,7 @@
 //!   then the oldest of all; of `hello` and `status` only the newest waits. [`Client::missed`] counts.
 //! - What comes from the network is no more than it may be, and never a panic: what is not understood is
 //!   passed on as [`Event::Unknown`], and what is no message at all ends the connection.
-//! - One that asks for no [views](Options::views) is sent two frames of each view at most, and none
-//!   once the run has heard that: views at which nobody looks rest, and cost the solver nothing.
+//! - One that asks for no [views](Options::views) is sent no frame: views at which nobody looks rest.
 //!
 //! # What it does not
 //!
@@ -95,6 +94,7 @@ use tombolo_pipelines::{
 };
 
 pub use crate::link::{Link, LinkError};
+use crate::stream::UNDRIVEN;
 pub use error::ClientError;
 pub use event::{
     Complaint, Done, End, Event, Foretold, Hello, LinkTold, MonitorName, People, Person,
@@ -170,6 +170,8 @@ pub struct Client {
     link: Link,
     /// How long an answer may take.
     answer: Duration,
+    /// Whether frames are handed out.
+    has_views: bool,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
     /// The prefix of this client's ids, which no other client uses.
@@ -194,7 +196,7 @@ impl Client {
         if !options.views {
             shared.with(|state| state.chosen = Some(BTreeSet::new()));
         }
-        let answer = options.answer;
+        let (answer, has_views) = (options.answer, options.views);
         let (on_thread, of, options) = (Arc::clone(&shared), link.clone(), options.clone());
         let serve = move || {
             let failure = runtime.block_on(connection::run(&of, &options, &on_thread));
@@ -206,7 +208,7 @@ impl Client {
         let thread = Some(thread.map_err(|error| system(error.to_string()))?);
         let mark = u32::from_le_bytes(mark);
         let (link, count) = (link.clone(), AtomicU64::new(0));
-        let client = Self { link, answer, shared, thread, mark, count };
+        let client = Self { link, answer, has_views, shared, thread, mark, count };
         let joined = client.shared.wait(Duration::MAX, |state| match &state.hello {
             Some(_) => Some(Ok(())),
             None => state.failure.clone().map(Err),
@@ -347,10 +349,21 @@ impl Client {
 
     /// Chooses the views whose frames are sent, by name; all of them where that is `None`, as they are at
     /// first. A name that no view has yet counts once one has it. Views at which nobody looks rest. A
-    /// client that asks for no [views](Options::views) hands no frames out whatever it chooses.
-    pub fn choose_views(&self, names: Option<BTreeSet<String>>) {
-        self.shared.with(|state| state.chosen = names);
-        self.shared.wake.notify_one();
+    /// client that asked for no [views](Options::views) is sent none whatever it chooses.
+    ///
+    /// # Errors
+    /// [`ClientError::TooMuch`] where the names are more than a run reads: 16 KiB of JSON.
+    pub fn choose_views(&self, names: Option<BTreeSet<String>>) -> Result<(), ClientError> {
+        let found = connection::choice(names.as_ref()).len();
+        if found > UNDRIVEN {
+            let what = "bytes of a choice of views";
+            return Err(ClientError::TooMuch { what, found, most: UNDRIVEN });
+        }
+        if self.has_views {
+            self.shared.with(|state| state.choose(names));
+            self.shared.wake.notify_one();
+        }
+        Ok(())
     }
 
     /// A link that opens one browser, once, to watch or to drive: the address of this client's own

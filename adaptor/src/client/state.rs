@@ -23,6 +23,8 @@ const COMMANDS: usize = 256;
 const COMMAND_BYTES: usize = 1 << 28;
 /// The id under which the wheel is asked for again.
 const WHEEL: &str = "wheel";
+/// Choices of views that wait to be sent; beyond it the oldest make way.
+const CHOICES: usize = 256;
 /// How long it is: longer than a server takes to see that a connection is gone.
 const REGAIN: Duration = Duration::from_secs(45);
 
@@ -65,6 +67,8 @@ pub(super) struct State {
     pub(super) asked: HashMap<String, Option<Event>>,
     /// The names of the views whose frames are wanted; all where that is `None`.
     pub(super) chosen: Option<BTreeSet<String>>,
+    /// The choices that were not sent yet, the oldest first.
+    pub(super) choices: VecDeque<Option<BTreeSet<String>>>,
     /// Why nothing comes any more.
     pub(super) failure: Option<ClientError>,
     pub(super) closing: bool,
@@ -206,6 +210,15 @@ impl State {
         }
     }
 
+    /// Takes a choice of views in.
+    pub(super) fn choose(&mut self, names: Option<BTreeSet<String>>) {
+        self.chosen.clone_from(&names);
+        if self.choices.len() >= CHOICES {
+            self.choices.pop_front();
+        }
+        self.choices.push_back(names);
+    }
+
     /// Takes a frame in.
     pub(super) fn put_frame(&mut self, frame: DecodedFrame) {
         let frame = Received { event: Event::Frame(frame.into()), text: "".into() };
@@ -222,6 +235,8 @@ impl State {
     pub(super) fn begin(&mut self, hello: &Hello) {
         self.connection += 1;
         self.taken = 0;
+        // A run sends all views until it is told.
+        self.choices = self.chosen.clone().map(Some).into_iter().collect();
         self.former = self.hello.as_ref().map(|hello| hello.client.clone());
         let regains = self.drives && hello.role == Role::Watcher;
         self.regain = regains.then(|| Instant::now() + REGAIN);

@@ -306,13 +306,13 @@ impl Hub {
     /// dropped.
     pub(crate) fn frame(&self, view: usize, name: &Arc<str>, encode: Encode) {
         let mut state = lock(&self.state);
-        let watched = self.audience().includes(Audience::of([&**name]));
+        let is_watched = self.audience().includes(Audience::of([&**name]));
         let named = || View { name: Arc::clone(name), ..View::default() };
         let known = state.views.entry(view).or_insert_with(named);
-        if known.waiting.replace(encode).is_some() && watched {
+        if known.waiting.replace(encode).is_some() && is_watched {
             self.counters.dropped.fetch_add(1, Ordering::Relaxed);
         }
-        if watched {
+        if is_watched {
             self.work.notify_one();
         }
     }
@@ -369,7 +369,8 @@ impl Hub {
                 }
                 let HubState { views, clients, observer, .. } = &mut *state;
                 let audience = || clients.values().chain(&*observer);
-                let waiting = views.iter_mut().find_map(|(&number, view)| {
+                let mut views = views.iter_mut().filter(|(_, view)| view.has_work());
+                let waiting = views.find_map(|(&number, view)| {
                     let name = Arc::clone(&view.name);
                     let mut looking = audience().filter(|client| client.looks_at(&name)).peekable();
                     looking.peek().is_some().then(|| view.due(number, looking)).flatten()
@@ -405,6 +406,11 @@ impl Hub {
 }
 
 impl View {
+    /// Whether there is anything to encode, should somebody look at it.
+    fn has_work(&self) -> bool {
+        self.waiting.is_some() || self.pending.contains(&true) || self.key_wanted.contains(&true)
+    }
+
     /// The next frame to encode, its level of precision, and whether it is a key frame.
     fn due<'a>(
         &mut self,
@@ -428,13 +434,15 @@ impl View {
 /// Done on the stream's thread.
 impl Hub {
     /// Lets a viewer in, unless there are `limit` already; one more of those who may drive has a
-    /// place beyond it. `returning` is what it was called before its connection was lost, and what it
+    /// place beyond it. One that `looks` at no view has none sent until it chooses some. `returning` is
+    /// what it was called before its connection was lost, and what it
     /// was told to come back with.
     pub(super) fn join(
         &self,
         limit: usize,
         access: Access,
         takes_wheel: bool,
+        looks: bool,
         returning: Option<(&str, &str)>,
     ) -> Result<Arrival, getrandom::Error> {
         let mut state = lock(&self.state);
@@ -447,6 +455,9 @@ impl Hub {
         };
         let (views, is_known) = (state.view_numbers(), state.is_described());
         let client = Arc::new(Client::new(id, access, back, views, Pace::default(), is_known));
+        if !looks {
+            client.choose(Some(BTreeSet::new()), state.known_views());
+        }
         state.seat(&client, takes_wheel);
         self.note_audience(&state);
         self.arrivals.fetch_add(1, Ordering::Relaxed);
@@ -474,8 +485,7 @@ impl Hub {
     pub(super) fn choose_views(&self, client: u64, chosen: Option<BTreeSet<String>>) {
         let state = lock(&self.state);
         if let Some(client) = state.clients.get(&client) {
-            let known = state.views.iter().map(|(&view, known)| (view, &*known.name));
-            client.choose(chosen, known);
+            client.choose(chosen, state.known_views());
         }
         self.note_audience(&state);
         drop(state);
@@ -568,6 +578,11 @@ impl HubState {
     /// Whether the run has said what it is.
     pub(super) fn is_described(&self) -> bool {
         self.description.is_some()
+    }
+
+    /// The views by their numbers, with their names.
+    fn known_views(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.views.iter().map(|(&view, known)| (view, &*known.name))
     }
 
     /// The numbers of the views.

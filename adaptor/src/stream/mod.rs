@@ -75,6 +75,7 @@ pub(crate) use hub::{Clock, End, Hub};
 pub(crate) use links::told_in;
 pub(crate) use observer::{Observed, Observer};
 pub(crate) use pace::{COARSER, EXACT, LEVELS};
+pub(crate) use session::UNDRIVEN;
 pub(crate) use surface::ReferenceSurface;
 
 use connect::Connect;

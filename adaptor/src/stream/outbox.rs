@@ -373,22 +373,25 @@ impl Client {
     }
 
     /// Chooses the views that the viewer looks at, all of them where that is `None`. It needs a key frame
-    /// of each that it did not look at before; `known` are the views there are.
+    /// of each that it did not look at before; `known` are the views there are. What is on its way
+    /// counts on.
     pub(super) fn choose<'a>(
         &self,
         chosen: Option<BTreeSet<String>>,
         known: impl Iterator<Item = (usize, &'a str)>,
     ) {
         self.put(|outbox| {
-            outbox.chosen = chosen;
+            let before = std::mem::replace(&mut outbox.chosen, chosen);
             for (view, name) in known {
-                if !outbox.looks_at(name) {
-                    outbox.views.remove(&view);
-                } else if !outbox.views.contains_key(&view) {
-                    let pace = outbox.pace.clone();
-                    let behind = Unread { is_behind: true, pace, ..Unread::default() };
-                    outbox.views.insert(view, behind);
+                let begun = || Unread { pace: outbox.pace.clone(), ..Unread::default() };
+                let looked = before.as_ref().is_none_or(|before| before.contains(name));
+                let looks = outbox.chosen.as_ref().is_none_or(|chosen| chosen.contains(name));
+                let unread = outbox.views.entry(view).or_insert_with(begun);
+                if looks != looked {
+                    unread.begin_anew();
                 }
+                // No key frame is made of what nobody looks at.
+                unread.has_asked |= !looks;
             }
         });
     }

@@ -44,7 +44,7 @@ const ORDERS: usize = 100;
 #[serde(deny_unknown_fields)]
 struct Asked {
     #[serde(default)]
-    id: Option<Value>,
+    id: Option<String>,
     play: Play,
 }
 
@@ -191,6 +191,8 @@ fn too_many() -> String {
 /// What a message asks for; the error is the answer.
 fn understood(text: &str) -> Result<Option<Play>, String> {
     let value: Value = serde_json::from_str(text).unwrap_or_default();
+    // One that is no text is not told back: it may be nested as deep as anything that is read.
+    let id = value.get("id").and_then(Value::as_str);
     if value.get("play").is_none() {
         // A viewer says by itself that somebody is there, and what it looks at. No solver makes these
         // frames, so that nothing is won by leaving some of them out.
@@ -199,11 +201,10 @@ fn understood(text: &str) -> Result<Option<Play>, String> {
         }
         let message =
             "this is a recording: it is gone through with `play`, and nothing can be ordered";
-        return Err(json!({"error": {"message": message, "id": value.get("id")}}).to_string());
+        return Err(json!({"error": {"message": message, "id": id}}).to_string());
     }
-    let asked: Asked = parse_json(text, "message").map_err(|error| {
-        json!({"error": {"message": error.to_string(), "id": value.get("id")}}).to_string()
-    })?;
+    let asked: Asked = parse_json(text, "message")
+        .map_err(|error| json!({"error": {"message": error.to_string(), "id": id}}).to_string())?;
     let wrong =
         |message: String| json!({"error": {"message": message, "id": asked.id}}).to_string();
     if let Some(speed) = asked.play.speed.filter(|speed| !SPEEDS.contains(speed)) {

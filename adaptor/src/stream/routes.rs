@@ -34,8 +34,8 @@ use super::{
 const MESSAGE_SIZE: usize = DOCUMENT.most + (1 << 16);
 /// The same for a client that can never command: nothing that it may say is near as long.
 const WATCHED_SIZE: usize = 1 << 16;
-/// Bytes of a viewer that are read at once. They are cleared before each read, and most messages are a
-/// few bytes: more would take the solver's data out of the caches.
+/// Bytes of a viewer that are read at once. They are cleared before each read, on a core that may be the
+/// solver's, and most messages are a few bytes.
 const READ_BUFFER: usize = 1 << 12;
 
 /// All routes, behind the gate.
@@ -81,7 +81,8 @@ async fn upgrade(
         }
         let returning = parameter(&uri, "client").zip(parameter(&uri, "back"));
         let limit = shared.limits.viewers.get() as usize;
-        let refusal = match shared.hub.join(limit, access, takes_wheel, returning) {
+        let looks = parameter(&uri, "views") != Some("none");
+        let refusal = match shared.hub.join(limit, access, takes_wheel, looks, returning) {
             Ok(Arrival::Client(client)) => {
                 let address = connection.address();
                 return session::serve(socket, client, holder, address, shared).await;

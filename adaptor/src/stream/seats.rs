@@ -199,7 +199,7 @@ mod tests {
     use crate::stream::hub::Arrival;
 
     fn joined(hub: &Hub, returning: Option<(&str, &str)>) -> Arc<Client> {
-        match hub.join(9, Access::Drive, true, returning) {
+        match hub.join(9, Access::Drive, true, true, returning) {
             Ok(Arrival::Client(client)) => client,
             _ => panic!("there is room"),
         }

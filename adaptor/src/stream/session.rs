@@ -29,9 +29,8 @@ use super::{
 };
 use crate::lock::lock;
 
-/// Bytes that are read of a viewer that cannot drive, and of one that does not but could.
-const WATCHED: usize = 1 << 10;
-const NOT_DRIVEN: usize = 1 << 13;
+/// Bytes of a message that are read of a viewer that does not drive: it may choose many views.
+pub(crate) const UNDRIVEN: usize = 1 << 14;
 /// How long a message beyond the allowance is held back before it is looked at again.
 const HELD_BACK: Duration = Duration::from_millis(100);
 
@@ -234,15 +233,14 @@ fn receive(
 ) -> Result<(), (Option<String>, String)> {
     let Seat { client, hub, commands, .. } = *seat;
     let drives = hub.is_driver(client.id);
-    let (watches, most) = match client.access {
-        Access::Drive => (
-            "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel",
-            NOT_DRIVEN,
-        ),
-        Access::Watch => ("the secret or link that this viewer came with is for watching", WATCHED),
+    let watches = match client.access {
+        Access::Drive => {
+            "this viewer watches; only the one that drives steers. {\"drive\": {}} asks for the wheel"
+        }
+        Access::Watch => "the secret or link that this viewer came with is for watching",
     };
-    // A viewer that watches can send a `drive` or a note; a longer message is not worth reading.
-    if !drives && text.len() > most {
+    // A viewer that watches sends nothing as long as that: a longer message is not worth reading.
+    if !drives && text.len() > UNDRIVEN {
         let bytes = text.len();
         seat.refuse(Refused::Long, |who| {
             format!("a message of {who} of {bytes} bytes was not read")

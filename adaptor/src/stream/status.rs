@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn a_status_is_told_again_where_none_was_told_for_long() {
         let hub = Hub::default();
-        let Ok(Arrival::Client(_viewer)) = hub.join(1, Access::Watch, true, None) else {
+        let Ok(Arrival::Client(_viewer)) = hub.join(1, Access::Watch, true, true, None) else {
             panic!("there is room for a viewer")
         };
         assert!(told(&hub).is_some_and(|(is_news, _)| is_news));

@@ -62,6 +62,35 @@ def test_a_surface_that_did_not_come_is_asked_for_again(solver, monkeypatch):
     relay.server.close()
 
 
+def test_the_views_that_come_are_those_at_which_somebody_looks(solver):
+    known = connection(solver.link)
+    run = wait(lambda: known.run)
+    wait(lambda: run.chosen_views == frozenset())
+    assert not run.views
+    look = known.look("midplane")
+    assert look.connection is known and wait(lambda: run.views.get(look.view)).name == "midplane"
+    del look
+    assert connection(solver.link) is known and run.chosen_views == frozenset()
+
+    # Any thread may look, and look away.
+    failures = []
+
+    def glance():
+        try:
+            for _ in range(300):
+                assert known.look("midplane").view == "midplane"
+        except Exception as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=glance) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    look = known.look("midplane")
+    assert failures == [] and run.chosen_views == {look.view}
+
+
 def test_another_run_behind_the_same_file_is_found_once_the_first_has_ended(begin, tmp_path, monkeypatch):
     first, file = begin(), tmp_path / "run.link"
     file.write_text(first.link)

@@ -396,8 +396,8 @@ def test_what_is_missing_is_told_at_each_press_in_plain_vtk(plugin, solver):
     written, order = plugin.make("TomboloExport", source), plugin.make("TomboloOrder", source)
     for button, text in (
         (written.Write, "FileName: found an empty text, expected the name of a file"),
-        (order.Give, "Link: found an empty text, expected the link"),
-        (order.Forecast, "Link: found an empty text, expected the link"),
+        (order.Give, "Link: found an empty text, expected the run's file"),
+        (order.Forecast, "Link: found an empty text, expected the run's file"),
     ):
         for _ in range(2):
             button()

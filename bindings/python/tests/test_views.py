@@ -149,7 +149,7 @@ def test_a_late_frame_of_a_removed_view_is_not_that_of_a_new_one():
 def test_the_views_that_are_chosen_are_those_that_come(run, solver):
     skin = {"name": "skin", "stages": [{"surface": {}}, {"stream": {}}]}
     run.change_pipelines({"set": [skin]}, timeout=30)
-    run.wait_for_view("skin", timeout=30)
+    # Also one that is announced a moment later.
     run.choose_views(["skin"])
     assert "midplane" not in run.views
     with pytest.raises(KeyError, match="'midplane' come: it was not chosen"):
@@ -162,12 +162,27 @@ def test_the_views_that_are_chosen_are_those_that_come(run, solver):
         run.choose_views(["skin", "sknn"])
     with pytest.raises(TypeError, match="found the text 'skin'"):
         run.choose_views("skin")
+    # No frame of the other comes, and none of before is shown later.
+    left_out = run.status.cycle
+    frames = run.events("frame", timeout=30)
+    while (frame := next(frames).data).cycle < left_out + 50:
+        assert frame.name == "skin" or frame.cycle <= left_out
     run.choose_views()
-    now = run.status.cycle
-    # What it showed before it was left out is not shown again.
     view = run.wait_for_view("midplane", timeout=30)
-    assert view.cycle > now - 20 and len(view.triangles)
+    assert view.cycle > left_out and len(view.triangles)
 
+    # A run that is paused has made no frame since: the newest is sent again.
+    run.pause(timeout=30)
+    for names in ([], None, ["midplane"], []):
+        run.choose_views(names)
+    run.choose_views()
+    assert run.wait_for_view("midplane", timeout=30).cycle == run.status.cycle
+    run.resume(timeout=30)
+
+    with tombolo.connect(solver.link, views=[]) as other:
+        assert not other.views and other.chosen_views == frozenset()
+        other.choose_views(["midplane"])
+        other.wait_for_view("midplane", timeout=30)
     with tombolo.connect(solver.link, views=["midplane"]) as other:
         now = other.status.cycle
         other.wait_for_view("midplane", after=now, timeout=30)

@@ -328,7 +328,7 @@ pub struct Steering {
     /// Whether the solver waits before its first step until a viewer has connected. Needs `stream`.
     pub wait_for_viewer: bool,
     /// On several ranks: at every how many calls of `execute` the ranks come together to hear what
-    /// was asked for and whether one of them has an error, by one reduction of six numbers. In
+    /// was asked for and whether one of them has an error, by one reduction of seven numbers. In
     /// between a call returns at once, and what falls due waits for the next such call. While the
     /// mesh moves they come together at every call.
     pub poll_steps: NonZeroU32,

@@ -9,6 +9,7 @@ use super::stage::{Action, Stage};
 use super::unread::Found;
 use super::{Csv, Log, Parameter, Problem, Problems, Render, nearest};
 use crate::expression::{Expression, UsedName};
+use crate::limits::{BINS, HISTORY};
 
 /// A number that a pipeline measures.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -44,7 +45,8 @@ pub fn monitors(pipeline: &Pipeline) -> Vec<Monitor> {
     all
 }
 
-/// The monitors of one stage; `has_faces` says whether the extract is one of faces, through which a
+/// The monitors of one stage; no more than the limits of a stage allow, for where all errors of a file
+/// are looked for, the names of a stage beyond them are asked for too. `has_faces` says whether the extract is one of faces, through which a
 /// vector field has a flux.
 pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
     let mut all = Vec::new();
@@ -83,7 +85,8 @@ pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
         Stage::Histogram(stage) => {
             ["lower", "upper"].iter().for_each(|name| add(&stage.name, name, stage.unit.as_ref()));
             ["below", "above"].iter().for_each(|name| add(&stage.name, name, None));
-            (0..stage.bins).for_each(|bin| add(&stage.name, &format!("bins.{bin}"), None));
+            let bins = (stage.bins as usize).min(BINS.most);
+            (0..bins).for_each(|bin| add(&stage.name, &format!("bins.{bin}"), None));
         }
         Stage::Force(stage) => {
             let (name, force) = (&stage.name, stage.unit.as_ref());
@@ -108,7 +111,8 @@ pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
         Stage::Spectrum(stage) => {
             ["frequency", "resolution"].iter().for_each(|name| add(&stage.name, name, None));
             add(&stage.name, "amplitude", stage.unit.as_ref());
-            (0..=stage.samples / 2).for_each(|k| add(&stage.name, &format!("power.{k}"), None));
+            let samples = (stage.samples as usize).min(HISTORY.most);
+            (0..=samples / 2).for_each(|k| add(&stage.name, &format!("power.{k}"), None));
         }
         _ => {}
     }

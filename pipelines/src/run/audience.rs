@@ -18,19 +18,19 @@
 pub struct Audience(u64);
 
 impl Audience {
-    /// Nobody looks at any view.
+    /// The audience that looks at no view.
     pub const NOBODY: Self = Self(0);
-    /// Somebody looks at each view.
+    /// The audience that looks at all views.
     pub const OF_ALL: Self = Self(u64::MAX);
 
-    /// Somebody looks at the views of these names.
+    /// The audience that looks at the views of these names.
     #[must_use]
     pub fn of<'a>(names: impl IntoIterator<Item = &'a str>) -> Self {
         let bits = names.into_iter().map(|name| 1 << (hash(name) % u64::from(u64::BITS)));
         Self(bits.fold(0, |all, bit: u64| all | bit))
     }
 
-    /// Both together.
+    /// The audience that looks at what either of two looks at.
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
@@ -43,13 +43,13 @@ impl Audience {
         other.0 & !self.0 == 0
     }
 
-    /// As a number, to be told to other processes.
+    /// The bits of an audience, to be told to other processes.
     #[must_use]
     pub const fn to_bits(self) -> u64 {
         self.0
     }
 
-    /// The audience of such a number.
+    /// The audience of bits that another process told.
     #[must_use]
     pub const fn from_bits(bits: u64) -> Self {
         Self(bits)
@@ -57,7 +57,7 @@ impl Audience {
 }
 
 impl Default for Audience {
-    /// Somebody looks at each view.
+    /// The audience that looks at all views.
     fn default() -> Self {
         Self::OF_ALL
     }

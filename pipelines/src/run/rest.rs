@@ -11,7 +11,7 @@ const SHARE: f64 = 1e-3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rest {
     only_shows: bool,
-    /// One who looks at its view.
+    /// The audience that looks at its view alone.
     looks: Audience,
     /// The second on the clock of rank 0 that it rests until; none where it has not rested since somebody
     /// looked.

@@ -187,6 +187,7 @@ export type ClientMessage = { id?: string } & (
   | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }
   | { link: { for: LinkFor } } | { name: { name: string } } | { follow: { on: boolean } } | { camera: ToldCamera }
   | { note: { text: string; at: Vector; cycle?: number } } | { remove_note: { number: number } }
+  | { views: { names?: string[] } }
 );
 
 /** Raised for a message that does not follow the protocol; the text says where it departs from it. */

@@ -98,6 +98,8 @@ class Watched:
         ------
         KeyError
             There is no such view.
+        TypeError
+            They are a text, which would be taken for a list of letters.
         CallError
             No frames come at all: the run was connected with ``views=False``.
         """
@@ -107,7 +109,7 @@ class Watched:
             raise TypeError(f"names: found the text {names!r}, expected a list of names")
         chosen = None if names is None else frozenset(names)
         for name in chosen or ():
-            if name not in self.view_names:
+            if not self._is_announced(name):
                 raise KeyError(unknown("view", name, self.view_names))
         client = self._reader.client
         with self._reader.changed:
@@ -116,7 +118,14 @@ class Watched:
             for name in list(self._state.views):
                 if (before is not None and name not in before) or (chosen is not None and name not in chosen):
                     del self._state.views[name]
-        client.choose_views(None if chosen is None else set(chosen))
+            client.choose_views(None if chosen is None else set(chosen))
+
+    def _is_announced(self, name: str) -> bool:
+        """Whether there is a view of this name: one that was added a moment ago is announced a moment later."""
+        try:
+            return self._reader.wait_for(lambda: name in self.view_names, _ANNOUNCED, "it was not announced")
+        except WaitError:
+            return False
 
     @property
     def hello(self) -> Mapping[str, Any]:
@@ -341,6 +350,8 @@ class Watched:
         since, patience = None if after is None else number(after, "after"), min(_ANNOUNCED, seconds(timeout))
 
         def found() -> Optional[View]:
+            if self._chosen is not None and name not in self._chosen:
+                raise CallError(not_chosen(name))
             view = self.views.get(name)
             return view if view is not None and (since is None or view.cycle > since) else None
 
@@ -350,8 +361,6 @@ class Watched:
                 yield (lambda: name in self.view_names), patience, "it was not announced"
             except WaitError:
                 raise KeyError(unknown("view", name, self.view_names)) from None
-        if self._chosen is not None and name not in self._chosen:
-            raise CallError(not_chosen(name))
         view: View = yield found, timeout, f"no {'' if after is None else 'newer '}frame of the view '{name}' came"
         return view
 

@@ -67,6 +67,8 @@ class Connection:
         self.surface: Optional[Surface] = None
         self.failure: Optional[str] = None
         self._again = 0.0
+        # Who looks, and what was chosen for them: by any thread.
+        self._choice = threading.Lock()
         self._looks: weakref.WeakSet[Look] = weakref.WeakSet()
         self._thread: Optional[threading.Thread] = None
         self._ask()
@@ -74,13 +76,21 @@ class Connection:
     def look(self, view: str) -> Look:
         """Look at a live view: its frames come to `run.views` as long as anybody refers to what is returned.
 
+        What nobody looks at any more is no longer sent once `connection` is called again.
+
         Parameters
         ----------
         view : str
-            The name of the view, which the run may get later.
+            The name of the view; one that the run gets later comes once `connection` is called again.
+
+        Returns
+        -------
+        Look
+            Keep it as long as the view is shown.
         """
         look = Look(self, view)
-        self._looks.add(look)
+        with self._choice:
+            self._looks.add(look)
         self._choose()
         return look
 
@@ -89,11 +99,12 @@ class Connection:
         run = self.run
         if run is None or not run.connected:
             return
-        names = frozenset(look.view for look in list(self._looks)) & frozenset(run.view_names)
-        if names != run.chosen_views:
-            # It may end meanwhile, of which whoever looks hears.
-            with contextlib.suppress(TomboloError):
-                run.choose_views(names)
+        with self._choice:
+            names = frozenset(look.view for look in self._looks) & frozenset(run.view_names)
+            if names != run.chosen_views:
+                # The run may end meanwhile, or a view be removed, of which whoever looks hears.
+                with contextlib.suppress(TomboloError, KeyError):
+                    run.choose_views(names)
 
     def _ask(self) -> None:
         """Try, unless it is being tried, is there or was tried just now."""
@@ -171,8 +182,8 @@ def connection(link: str) -> Optional[Connection]:
         if known is None:
             known = _CONNECTIONS[link] = Connection(link)
         known._ask()
-        known._choose()
-        return known
+    known._choose()
+    return known
 
 
 class Requests:

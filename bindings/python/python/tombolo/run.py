@@ -595,6 +595,10 @@ def connect(
         The run is not reached: the text says why.
     WaitError
         It does not answer within `timeout`.
+    KeyError
+        There is no view of a name in `views`.
+    TypeError
+        `views` is a text.
 
     Examples
     --------
@@ -619,7 +623,7 @@ def connect(
     # A text would be taken for a list of letters.
     if isinstance(views, str):
         raise TypeError(f"views: found the text {views!r}, expected True, False or a list of names")
-    has_views = views if isinstance(views, bool) else bool(views)
+    has_views = views is not False
     run = Run(text, watch=watch, views=has_views, attempts=retries, timeout=patience)
     if has_views and not isinstance(views, bool):
         try:
