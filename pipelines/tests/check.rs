@@ -164,6 +164,22 @@ fn what_is_beyond_a_limit_is_told_and_not_made() {
     assert_eq!(told.lines().count(), 2, "{told}");
 }
 
+/// A pipeline may name the monitors of all others: were they listed for each, this would take minutes.
+#[test]
+fn as_many_pipelines_and_monitors_as_there_may_be_are_checked() {
+    let pipelines: Vec<String> = (0..1024)
+        .map(|number| {
+            format!(
+                r#"{{"name": "p{number}", "stages": [
+                    {{"histogram": {{"field": "p", "name": "h", "bins": 1024}}}}]}}"#
+            )
+        })
+        .collect();
+    let text = format!(r#"{{"version": 1, "pipelines": [{}]}}"#, pipelines.join(","));
+    assert_eq!(told(&text), "nothing");
+    assert!(parse(&text, "views.json").is_ok());
+}
+
 #[test]
 fn all_errors_of_orders_are_told() {
     assert_told(

@@ -259,8 +259,8 @@ impl Client {
     }
 
     /// Chooses the views whose frames are sent; all of them for None.
-    fn choose_views(&self, names: Option<BTreeSet<String>>) {
-        self.client.choose_views(names);
+    fn choose_views(&self, names: Option<BTreeSet<String>>) -> PyResult<()> {
+        self.client.choose_views(names).map_err(of_client)
     }
 
     /// Changes the pipelines; returns the id of the change.

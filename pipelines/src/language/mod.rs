@@ -87,7 +87,7 @@ pub use journal::{
 pub use journal_file::read_orders_text;
 pub use journal_since::{Outcome, Since, SinceError, Taken};
 pub use message::{Message, Wheel, parse_message};
-pub(crate) use monitors::{Condition, Line, Scope, Slot, columns, line, monitors_of};
+pub(crate) use monitors::{Condition, Line, Monitored, Scope, Slot, columns, line, monitors_of};
 pub use monitors::{Monitor, check_parameters, monitors};
 pub use order::{Cancel, Change, Command, Order, Question};
 pub use orders_text::parse_orders;

@@ -31,6 +31,10 @@ impl Monitor {
     }
 }
 
+/// Names among which the nearest to an unknown one is looked for: each takes a microsecond, and there may
+/// be a million.
+const NEAR: usize = 10_000;
+
 /// The suffixes of the names of vector components.
 const XYZ: [&str; 3] = ["x", "y", "z"];
 
@@ -130,33 +134,47 @@ pub(crate) enum Slot {
     Parameter(String),
 }
 
-/// The names that a pipeline may use.
-pub(crate) struct Scope {
-    own: Vec<Monitor>,
-    /// The monitors of other pipelines, by the pipelines' indices.
-    others: Vec<(usize, String, Vec<Monitor>)>,
+/// The pipelines of a configuration with the monitors of each, which are listed once: a pipeline may name
+/// those of all others.
+pub(crate) struct Monitored<'a> {
+    pub(crate) pipelines: &'a [Pipeline],
+    monitors: Vec<Vec<Monitor>>,
 }
 
-impl Scope {
-    pub(crate) fn of(pipelines: &[Pipeline], index: usize) -> Self {
-        let others = pipelines.iter().enumerate().filter(|(other, _)| *other != index);
-        let other =
-            |(index, other): (usize, &Pipeline)| (index, other.name.clone(), monitors(other));
-        Self { own: monitors(&pipelines[index]), others: others.map(other).collect() }
+impl<'a> Monitored<'a> {
+    pub(crate) fn of(pipelines: &'a [Pipeline]) -> Self {
+        Self { pipelines, monitors: pipelines.iter().map(monitors).collect() }
     }
 
+    /// The names that the pipeline at an index may use.
+    pub(crate) fn scope(&self, index: usize) -> Scope<'_> {
+        Scope { all: self, index }
+    }
+}
+
+/// The names that a pipeline may use.
+pub(crate) struct Scope<'a> {
+    all: &'a Monitored<'a>,
+    index: usize,
+}
+
+impl Scope<'_> {
     /// The pipeline's own monitors.
     pub(crate) fn own(&self) -> &[Monitor] {
-        &self.own
+        &self.all.monitors[self.index]
     }
 
     /// The monitors of other pipelines but `cycle` and `time`, with their indices and with the names
     /// by which any of them may be called.
     fn of_others(&self) -> impl Iterator<Item = (Slot, &str, &Monitor)> {
-        self.others.iter().flat_map(|(pipeline, name, monitors)| {
-            monitors.iter().enumerate().skip(2).map(move |(monitor, of)| {
-                (Slot::Other { pipeline: *pipeline, monitor }, name.as_str(), of)
-            })
+        let all = self.all.pipelines.iter().zip(&self.all.monitors).enumerate();
+        let others = all.filter(|(index, _)| *index != self.index);
+        others.flat_map(|(pipeline, (of, monitors))| {
+            monitors
+                .iter()
+                .enumerate()
+                .skip(2)
+                .map(move |(monitor, it)| (Slot::Other { pipeline, monitor }, of.name.as_str(), it))
         })
     }
 
@@ -168,7 +186,7 @@ impl Scope {
         if let Some(parameter) = name.strip_prefix(PARAMETER) {
             return Ok(Slot::Parameter(parameter.to_owned()));
         }
-        if let Some(own) = self.own.iter().position(|monitor| monitor.name == name) {
+        if let Some(own) = self.own().iter().position(|monitor| monitor.name == name) {
             return Ok(Slot::Own(own));
         }
         let qualified = |pipeline: &str, monitor: &Monitor| format!("{pipeline}/{}", monitor.name);
@@ -187,12 +205,12 @@ impl Scope {
             ))),
             (None, _) => {
                 let mut known: Vec<String> =
-                    self.own.iter().map(|monitor| monitor.name.clone()).collect();
+                    self.own().iter().map(|monitor| monitor.name.clone()).collect();
                 let others = self.of_others();
                 known.extend(others.flat_map(|(_, pipeline, monitor)| {
                     [monitor.name.clone(), qualified(pipeline, monitor)]
                 }));
-                let near = nearest(name, known.iter().map(String::as_str));
+                let near = nearest(name, known.iter().take(NEAR).map(String::as_str));
                 Err(Problem::new(format!(
                     "found the unknown name `{name:.60}`, expected a monitor"
                 ))
@@ -205,10 +223,9 @@ impl Scope {
     /// The monitor at an index, with the name by which it was called.
     pub(crate) fn monitor(&self, name: &str, slot: &Slot) -> Monitor {
         let monitor = match slot {
-            Slot::Own(index) => self.own.get(*index),
+            Slot::Own(index) => self.own().get(*index),
             Slot::Other { pipeline, monitor } => {
-                let other = self.others.iter().find(|(index, ..)| index == pipeline);
-                other.and_then(|(_, _, monitors)| monitors.get(*monitor))
+                self.all.monitors.get(*pipeline).and_then(|monitors| monitors.get(*monitor))
             }
             Slot::Parameter(_) => None,
         };
@@ -226,13 +243,13 @@ pub(crate) struct Condition {
 impl Condition {
     /// # Errors
     /// A [`Problem`] at the first token that is wrong.
-    pub(crate) fn parse(text: &str, scope: &Scope) -> Result<Self, Problem> {
+    pub(crate) fn parse(text: &str, scope: &Scope<'_>) -> Result<Self, Problem> {
         Self::find(text, scope).map_err(|mut problems| problems.swap_remove(0))
     }
 
     /// # Errors
     /// One [`Problem`] where the text is no condition, or one for each name that is not known.
-    fn find(text: &str, scope: &Scope) -> Result<Self, Vec<Problem>> {
+    fn find(text: &str, scope: &Scope<'_>) -> Result<Self, Vec<Problem>> {
         let (expression, names) = Expression::parse_open_condition(text).map_err(|error| {
             let message = format!("column {} of the formula: {}", error.column, error.message);
             vec![Problem::new(message).suggest(error.suggestion.as_deref())]
@@ -257,7 +274,7 @@ impl Condition {
 }
 
 /// The monitors of a table, and where each is found.
-pub(crate) fn columns(csv: &Csv, scope: &Scope) -> Result<Vec<(Monitor, Slot)>, Problem> {
+pub(crate) fn columns(csv: &Csv, scope: &Scope<'_>) -> Result<Vec<(Monitor, Slot)>, Problem> {
     if csv.monitors.is_empty() {
         let own = scope.own().iter().enumerate().skip(2);
         return Ok(own.map(|(index, it)| (it.clone(), Slot::Own(index))).collect());
@@ -273,7 +290,7 @@ pub(crate) fn columns(csv: &Csv, scope: &Scope) -> Result<Vec<(Monitor, Slot)>, 
 pub(crate) type Line = Vec<(String, Option<Slot>)>;
 
 /// The parts of a line in the log.
-pub(crate) fn line(log: &Log, scope: &Scope) -> Result<Line, Problem> {
+pub(crate) fn line(log: &Log, scope: &Scope<'_>) -> Result<Line, Problem> {
     if log.message.is_some() {
         let part = |(text, name): (&str, Option<&str>)| {
             let slot = name.map(|name| scope.find(name)).transpose();
@@ -295,9 +312,10 @@ pub(super) fn check(config: &Config, found: &mut Found) {
     let mut files = Vec::new();
     let mut databases = HashSet::new();
     let faulty = found.parts();
+    let monitored = Monitored::of(&config.pipelines);
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
-        let scope = Scope::of(&config.pipelines, index);
+        let scope = monitored.scope(index);
         let (problems, twice) = check_pipeline(pipeline, &scope);
         found.extend(problems.into_problems(), located);
         // A stage with another fault is told of that.
@@ -333,9 +351,10 @@ pub(super) fn check(config: &Config, found: &mut Found) {
 pub fn check_parameters(config: &Config, known: &[&str]) -> Result<(), Problems> {
     let parameters = Parameters { known };
     let mut found = Found::default();
+    let monitored = Monitored::of(&config.pipelines);
     for (index, pipeline) in config.pipelines.iter().enumerate() {
         let located = |problem: Problem| problem.at(index).within("pipelines");
-        let scope = Scope::of(&config.pipelines, index);
+        let scope = monitored.scope(index);
         let again = match &pipeline.again_after {
             Some(AgainAfter::Condition(text)) => Some(text),
             _ => None,
@@ -389,7 +408,7 @@ impl Parameters<'_> {
         }
     }
 
-    fn check_condition(&self, text: &str, scope: &Scope) -> Result<(), Problem> {
+    fn check_condition(&self, text: &str, scope: &Scope<'_>) -> Result<(), Problem> {
         let condition = Condition::parse(text, scope)?;
         condition.slots.iter().try_for_each(|slot| self.check_slot(slot))
     }
@@ -398,7 +417,7 @@ impl Parameters<'_> {
         self.check(&parameter.name).map_err(|problem| problem.within("name"))
     }
 
-    fn check_table(&self, csv: &Csv, scope: &Scope) -> Result<(), Problem> {
+    fn check_table(&self, csv: &Csv, scope: &Scope<'_>) -> Result<(), Problem> {
         let columns = columns(csv, scope)?;
         columns.iter().enumerate().try_for_each(|(index, (_, slot))| {
             self.check_slot(slot).map_err(|problem| problem.at(index).within("monitors"))
@@ -411,7 +430,7 @@ impl Parameters<'_> {
             .try_for_each(|(index, name)| self.check(&name).map_err(|it| formula.at(index, it)))
     }
 
-    fn check_line(&self, log: &Log, scope: &Scope) -> Result<(), Problem> {
+    fn check_line(&self, log: &Log, scope: &Scope<'_>) -> Result<(), Problem> {
         let mut slots = line(log, scope)?.into_iter().filter_map(|(_, slot)| slot);
         slots
             .try_for_each(|slot| self.check_slot(&slot))
@@ -442,7 +461,7 @@ fn pictures(pipeline: &Pipeline) -> impl Iterator<Item = &Render> {
 }
 
 /// The problems of the names that a pipeline uses, and of those that it defines twice.
-fn check_pipeline(pipeline: &Pipeline, scope: &Scope) -> (Found, Vec<Problem>) {
+fn check_pipeline(pipeline: &Pipeline, scope: &Scope<'_>) -> (Found, Vec<Problem>) {
     let (mut found, mut all_twice) = (Found::default(), Vec::new());
     let has_faces = pipeline.stages.iter().any(Stage::takes_faces);
     // How many values there are before a stage, and their monitors.

@@ -12,7 +12,7 @@ use super::history::{Board, History};
 use super::pipeline::Prepared;
 use crate::extract::{Channel, Snapshot, Source};
 use crate::files::read_displacement;
-use crate::language::{Action, Config, Due, Formula, Problem, Stage, Trial, monitors};
+use crate::language::{Action, Config, Due, Formula, Monitored, Problem, Stage, Trial, monitors};
 
 /// A mesh on which pipelines and orders are tried, as a run would show it at its first step.
 ///
@@ -73,9 +73,9 @@ impl<'a> MeshTrial<'a> {
         self.only.as_deref().is_none_or(|only| channel == Some(only))
     }
 
-    fn run(&self, config: &Config, index: usize) -> Vec<Problem> {
+    fn run(&self, config: &Config, monitored: &Monitored<'_>, index: usize) -> Vec<Problem> {
         // A pipeline that cannot be prepared was told already.
-        let Ok(mut prepared) = Prepared::new(&config.pipelines, index) else { return Vec::new() };
+        let Ok(mut prepared) = Prepared::new(monitored, index) else { return Vec::new() };
         let histories = config.pipelines.iter().map(|pipeline| {
             let monitors = monitors(pipeline).split_off(2);
             History::new(monitors)
@@ -103,13 +103,14 @@ impl Trial for MeshTrial<'_> {
     fn configuration(&mut self, config: &Config, is_sound: &dyn Fn(usize) -> bool) -> Vec<Problem> {
         let mut problems = Vec::new();
         let unconditional = unconditional(config);
+        let monitored = Monitored::of(&unconditional.pipelines);
         for (index, pipeline) in config.pipelines.iter().enumerate() {
             if !self.reads(pipeline.channel.as_deref()) || !is_sound(index) {
                 continue;
             }
             let mut of_pipeline = match pipeline.due {
                 Due::OnOrder | Due::OnEnd => Vec::new(),
-                _ => self.run(&unconditional, index),
+                _ => self.run(&unconditional, &monitored, index),
             };
             for (index, stage) in pipeline.stages.iter().enumerate() {
                 let found = match (stage, stage.edit()) {

@@ -20,7 +20,7 @@ use std::time::Instant;
 use tombolo_deform::{mesh::Mesh, surface::Surface};
 
 use crate::extract::{Channel, Snapshot, Source};
-use crate::language::{Config, Due, Pipeline, Problem, Stage, Validate, monitors};
+use crate::language::{Config, Due, Monitored, Pipeline, Problem, Stage, Validate, monitors};
 use due::Now;
 use history::Board;
 use pipeline::Prepared;
@@ -298,9 +298,10 @@ fn prepared(config: &Config) -> Result<(Vec<Prepared>, Vec<History>), Problem> {
     config.validate()?;
     let all = &config.pipelines;
     let indices = (0..all.len()).filter(|&index| all[index].due != Due::OnOrder);
+    let monitored = Monitored::of(all);
     let prepared = |index: usize| {
         let located = |problem: Problem| problem.at(index).within("pipelines");
-        Prepared::new(all, index).map_err(located)
+        Prepared::new(&monitored, index).map_err(located)
     };
     let pipelines: Result<Vec<_>, _> = indices.map(prepared).collect();
     let history = |pipeline| History::new(monitors(pipeline).split_off(2));

@@ -7,7 +7,7 @@ use super::output::{Frame, Table};
 use super::pipeline::Prepared;
 use super::{Runner, prepared, source};
 use crate::extract::{Channel, Snapshot};
-use crate::language::{Config, Due, Pipeline, Problem};
+use crate::language::{Config, Due, Monitored, Pipeline, Problem};
 
 /// Why other pipelines cannot take over. Those before go on as they were.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -111,11 +111,12 @@ impl Runner {
         removed.extend(gone.map(|known| known.name.clone()));
         let mut next =
             Replacement { pipelines, histories, all, added, replaced, removed, frames: Vec::new() };
+        let monitored = Monitored::of(&next.all);
         for (index, pipeline) in next.all.iter().enumerate() {
             // When the run ends there is no mesh, and orders are settings alone.
             let is_of_mesh = !matches!(pipeline.due, Due::OnEnd | Due::OnOrder);
             if is_of_mesh && !next.keeps(&pipeline.name) {
-                next.frames.extend(self.try_out(&next.all, index, snapshot)?);
+                next.frames.extend(self.try_out(&monitored, index, snapshot)?);
             }
         }
         Ok(next)
@@ -123,11 +124,11 @@ impl Runner {
 
     fn try_out(
         &mut self,
-        all: &[Pipeline],
+        all: &Monitored<'_>,
         index: usize,
         snapshot: &Snapshot,
     ) -> Result<Vec<Frame>, ReplaceError> {
-        let (trial, pipeline) = (Prepared::new(all, index)?, &all[index]);
+        let (trial, pipeline) = (Prepared::new(all, index)?, &all.pipelines[index]);
         let name = pipeline.channel.as_deref();
         let found = source(&mut self.sources, snapshot.channels, name, &self.communicator);
         let tried = match found {

@@ -32,7 +32,7 @@ enum Again {
 impl Trigger {
     /// # Errors
     /// A [`Problem`] of a condition.
-    pub(super) fn new(pipeline: &Pipeline, scope: &Scope) -> Result<Self, Problem> {
+    pub(super) fn new(pipeline: &Pipeline, scope: &Scope<'_>) -> Result<Self, Problem> {
         let parse = |text: &String| Condition::parse(text, scope);
         let condition = pipeline.when.as_ref().map(parse).transpose();
         let again = match &pipeline.again_after {
@@ -114,7 +114,7 @@ fn has_passed(every: Every, since: Moment, now: Moment) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::parse;
+    use crate::language::{Monitored, parse};
 
     /// The cycles at which a pipeline acts that watches a parameter.
     fn acts(keys: &str, values: &[f64]) -> Vec<u64> {
@@ -122,8 +122,8 @@ mod tests {
             r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [], {keys}, "then": [{{"stop": {{}}}}]}}]}}"#
         );
         let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-        let scope = Scope::of(&config.pipelines, 0);
-        let mut trigger = Trigger::new(&config.pipelines[0], &scope).unwrap();
+        let monitored = Monitored::of(&config.pipelines);
+        let mut trigger = Trigger::new(&config.pipelines[0], &monitored.scope(0)).unwrap();
         let mut found = Vec::new();
         for (cycle, &value) in (0..).zip(values) {
             if trigger.fires((cycle, 0.1 * cycle as f64), |_| value) {

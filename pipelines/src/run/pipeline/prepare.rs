@@ -14,8 +14,8 @@ use super::Prepared;
 use crate::derive::Running;
 use crate::extract::Kept;
 use crate::language::{
-    Action, Csv, Derived, Line, Monitor, Pipeline, Problem, Scope, Slot, Stage, Viscosity, columns,
-    line, monitors,
+    Action, Csv, Derived, Line, Monitor, Monitored, Problem, Scope, Slot, Stage, Viscosity,
+    columns, line, monitors,
 };
 use crate::reduce::{OverTime, Samples};
 
@@ -57,9 +57,9 @@ pub(super) fn gradient_of(velocity: &str) -> String {
 
 impl Prepared {
     /// Prepares the pipeline at an index of a valid configuration.
-    pub(crate) fn new(pipelines: &[Pipeline], index: usize) -> Result<Self, Problem> {
-        let pipeline = &pipelines[index];
-        let scope = Scope::of(pipelines, index);
+    pub(crate) fn new(all: &Monitored<'_>, index: usize) -> Result<Self, Problem> {
+        let pipeline = &all.pipelines[index];
+        let scope = all.scope(index);
         let mut selected: Option<HashSet<String>> = None;
         for stage in &pipeline.stages {
             if let Stage::Select(select) = stage {
@@ -202,7 +202,7 @@ fn used_fields(stage: &Stage) -> Vec<&str> {
     }
 }
 
-fn names_of(stage: &Stage, scope: &Scope) -> Result<Names, Problem> {
+fn names_of(stage: &Stage, scope: &Scope<'_>) -> Result<Names, Problem> {
     Ok(match stage {
         Stage::Difference(stage) => {
             Names::Difference(scope.find(&stage.of)?, scope.find(&stage.minus)?)
@@ -218,7 +218,7 @@ fn names_of(stage: &Stage, scope: &Scope) -> Result<Names, Problem> {
     })
 }
 
-fn table(csv: &Csv, scope: &Scope) -> Result<Names, Problem> {
+fn table(csv: &Csv, scope: &Scope<'_>) -> Result<Names, Problem> {
     let (monitors, slots): (Vec<Monitor>, Vec<Slot>) = columns(csv, scope)?.into_iter().unzip();
     let titles = monitors.iter().map(Monitor::titled).collect();
     let table = Table { file: csv.file.clone(), titles, existing: csv.existing };
