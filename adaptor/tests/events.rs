@@ -213,10 +213,10 @@ fn what_is_refused_is_told_once_with_who_and_what() {
     let command = told("this viewer does not drive");
     assert_eq!((command.get("viewer"), command.get("level")), ("c1", "WARN"));
     assert!(command.get("message").contains("asked for pause"), "{command:?}");
-    watcher.send_text(&" ".repeat(5000));
+    watcher.send_text(&" ".repeat(20_000));
     watcher.wait_for("error", |error| error["id"].is_null());
     let long = told("it is longer than it may be");
-    assert!(long.get("message").contains("c1 from 127.0.0.1 of 5000 bytes"), "{long:?}");
+    assert!(long.get("message").contains("c1 from 127.0.0.1 of 20000 bytes"), "{long:?}");
     // More than three at once, which wait then.
     (0..10).for_each(|_| watcher.send(&json!({"stop": {}})));
     (0..10).for_each(|_| drop(watcher.wait_for("error", |_| true)));

@@ -49,9 +49,9 @@ pub fn monitors(pipeline: &Pipeline) -> Vec<Monitor> {
     all
 }
 
-/// The monitors of one stage; no more than the limits of a stage allow, for where all errors of a file
-/// are looked for, the names of a stage beyond them are asked for too. `has_faces` says whether the extract is one of faces, through which a
-/// vector field has a flux.
+/// The monitors of one stage, no more than its limits allow: where all errors of a file are looked for,
+/// the names of a stage beyond them are asked for too. `has_faces` says whether the extract is one of
+/// faces, through which a vector field has a flux.
 pub(crate) fn monitors_of(stage: &Stage, has_faces: bool) -> Vec<Monitor> {
     let mut all = Vec::new();
     let mut add = |prefix: &str, suffix: &str, unit: Option<&String>| {
