@@ -289,7 +289,7 @@ fn the_views_that_were_chosen_are_those_that_come_also_after_a_lost_connection()
         // Frames that were on their way come first.
         while next(&client).0 != view {}
         let (_, from) = next(&client);
-        // Those of the other that were on their way have come by then.
+        // Frames of the other view that were on their way have come by then.
         while next(&client).1 < from + 300 {}
         assert_eq!(next(&client).0, view);
     }

@@ -554,7 +554,7 @@ fn let_wait(solver: &mut Solver, trace: &mut Trace) {
     accepted(&mut viewer, "c");
 }
 
-/// A run with orders that wait, behind what is done with it first; its folder, and its steps so far.
+/// A run with orders that wait, which were given after `first`; its folder, and its steps so far.
 fn waiting(first: impl Fn(&mut Solver)) -> (tempfile::TempDir, Solver, Trace) {
     for _ in 0..20 {
         let (output, mut trace) = (tempfile::tempdir().unwrap(), Trace::new());

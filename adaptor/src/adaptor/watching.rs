@@ -45,8 +45,8 @@ impl Adaptor {
         }
     }
 
-    /// Wakes the views that rest, once somebody looks at them. Where the solver was told that nothing looks at
-    /// this step, the next one wakes them. Returns whether they are awake from now on. Collective.
+    /// Wakes the views that rest, once somebody looks at them. Where the solver was told that nothing
+    /// looks at this step, the next one wakes them. Returns whether they are awake from now on. Collective.
     #[inline]
     pub(super) fn notice_viewers(&mut self, outside: Outside) -> bool {
         let wakes = !self.pipelines.audience().includes(outside.audience)

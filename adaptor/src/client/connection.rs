@@ -218,8 +218,8 @@ async fn session(socket: &mut Socket, options: &Options, shared: &Shared) -> Ove
     let mut regain = tokio::time::interval(REGAIN);
     let mut heard = Instant::now();
     loop {
-        // One that asks for no views acknowledges the first frame alone: no more than two of each
-        // view are on their way to it, before the run has heard that.
+        // A recording sends frames also to one that asks for no views. It acknowledges the first alone, so
+        // that few are on their way.
         let (unsent, taken, closing, choices) = shared.with(|state| {
             (state.unsent(), state.taken, state.closing, std::mem::take(&mut state.choices))
         });

@@ -60,7 +60,8 @@
 //!   then the oldest of all; of `hello` and `status` only the newest waits. [`Client::missed`] counts.
 //! - What comes from the network is no more than it may be, and never a panic: what is not understood is
 //!   passed on as [`Event::Unknown`], and what is no message at all ends the connection.
-//! - One that asks for no [views](Options::views) is sent no frame: views at which nobody looks rest.
+//! - One that asks for no [views](Options::views) is sent no frame by a run, whose views rest
+//!   while nobody looks at them; a recording sends frames all the same.
 //!
 //! # What it does not
 //!

@@ -21,11 +21,11 @@ const FRAMES: usize = 64;
 /// Commands that wait for an answer, and their bytes.
 const COMMANDS: usize = 256;
 const COMMAND_BYTES: usize = 1 << 28;
-/// The id under which the wheel is asked for again.
-const WHEEL: &str = "wheel";
 /// Choices of views that wait to be sent; beyond it the oldest make way.
 const CHOICES: usize = 256;
-/// How long it is: longer than a server takes to see that a connection is gone.
+/// The id under which the wheel is asked for again.
+const WHEEL: &str = "wheel";
+/// How long the wheel is asked for again: longer than a server takes to see that a connection is gone.
 const REGAIN: Duration = Duration::from_secs(45);
 
 /// A command that was not answered yet.

@@ -434,9 +434,9 @@ impl View {
 /// Done on the stream's thread.
 impl Hub {
     /// Lets a viewer in, unless there are `limit` already; one more of those who may drive has a
-    /// place beyond it. One that `looks` at no view has none sent until it chooses some. `returning` is
-    /// what it was called before its connection was lost, and what it
-    /// was told to come back with.
+    /// place beyond it. One that does not look at views (`looks`) is sent none until it chooses some.
+    /// `returning` is what it was called before its connection was lost, and what it was told to come
+    /// back with.
     pub(super) fn join(
         &self,
         limit: usize,
@@ -587,6 +587,6 @@ impl HubState {
 
     /// The numbers of the views.
     pub(super) fn view_numbers(&self) -> impl Iterator<Item = usize> {
-        self.views.keys().copied()
+        self.known_views().map(|(view, _)| view)
     }
 }

@@ -154,9 +154,14 @@ struct Outbox {
     last: Option<Text>,
 }
 
+/// Whether a view is among those chosen; all are where nothing was.
+fn is_chosen(chosen: Option<&BTreeSet<String>>, name: &str) -> bool {
+    chosen.is_none_or(|chosen| chosen.contains(name))
+}
+
 impl Outbox {
     fn looks_at(&self, name: &str) -> bool {
-        self.chosen.as_ref().is_none_or(|chosen| chosen.contains(name))
+        is_chosen(self.chosen.as_ref(), name)
     }
 
     /// The next frame, or a view whose next key frame is to be asked for.
@@ -384,8 +389,8 @@ impl Client {
             let before = std::mem::replace(&mut outbox.chosen, chosen);
             for (view, name) in known {
                 let begun = || Unread { pace: outbox.pace.clone(), ..Unread::default() };
-                let looked = before.as_ref().is_none_or(|before| before.contains(name));
-                let looks = outbox.chosen.as_ref().is_none_or(|chosen| chosen.contains(name));
+                let looked = is_chosen(before.as_ref(), name);
+                let looks = is_chosen(outbox.chosen.as_ref(), name);
                 let unread = outbox.views.entry(view).or_insert_with(begun);
                 if looks != looked {
                     unread.begin_anew();

@@ -194,8 +194,8 @@ fn understood(text: &str) -> Result<Option<Play>, String> {
     // One that is no text is not told back: it may be nested as deep as anything that is read.
     let id = value.get("id").and_then(Value::as_str);
     if value.get("play").is_none() {
-        // A viewer says by itself that somebody is there, and what it looks at. No solver makes these
-        // frames, so that nothing is won by leaving some of them out.
+        // A viewer says by itself that somebody is there, and which views it looks at. A recording sends
+        // all of them.
         if ["here", "drive", "views"].iter().any(|said| value.get(said).is_some()) {
             return Ok(None);
         }

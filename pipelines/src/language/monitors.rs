@@ -31,8 +31,7 @@ impl Monitor {
     }
 }
 
-/// Names among which the nearest to an unknown one is looked for: each takes a microsecond, and there may
-/// be a million.
+/// Names among which the nearest to an unknown one is looked for: there may be a million.
 const NEAR: usize = 10_000;
 
 /// The suffixes of the names of vector components.
@@ -204,13 +203,12 @@ impl Scope<'_> {
                 qualified(b, second)
             ))),
             (None, _) => {
-                let mut known: Vec<String> =
-                    self.own().iter().map(|monitor| monitor.name.clone()).collect();
-                let others = self.of_others();
-                known.extend(others.flat_map(|(_, pipeline, monitor)| {
+                let own = self.own().iter().map(|monitor| monitor.name.clone());
+                let others = self.of_others().flat_map(|(_, pipeline, monitor)| {
                     [monitor.name.clone(), qualified(pipeline, monitor)]
-                }));
-                let near = nearest(name, known.iter().take(NEAR).map(String::as_str));
+                });
+                let known: Vec<String> = own.chain(others).take(NEAR).collect();
+                let near = nearest(name, known.iter().map(String::as_str));
                 Err(Problem::new(format!(
                     "found the unknown name `{name:.60}`, expected a monitor"
                 ))
