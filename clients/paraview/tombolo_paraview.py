@@ -124,7 +124,7 @@ def _vertices(data):
 
 
 def _fingerprint(vertices, moved):
-    """That of a displacement of vertices, in whatever order and how often each of them comes."""
+    """A text that tells a displacement of vertices from others, in whatever order and however often each comes."""
     vertices, first = np.unique(vertices, return_index=True)
     made = hashlib.blake2b(vertices.astype(np.int64), digest_size=16)
     made.update(np.ascontiguousarray(moved[first]))

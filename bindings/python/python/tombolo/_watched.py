@@ -111,6 +111,10 @@ class Watched:
         for name in chosen or ():
             if not self._is_announced(name):
                 raise KeyError(unknown("view", name, self.view_names))
+        self._choose(chosen)
+
+    def _choose(self, chosen: Optional[frozenset[str]]) -> None:
+        """Choose views without a wait, whether they are there or not."""
         client = self._reader.client
         with self._reader.changed:
             before, self._chosen = self._chosen, chosen

@@ -102,9 +102,9 @@ class Connection:
         with self._choice:
             names = frozenset(look.view for look in self._looks) & frozenset(run.view_names)
             if names != run.chosen_views:
-                # The run may end meanwhile, or a view be removed, of which whoever looks hears.
-                with contextlib.suppress(TomboloError, KeyError):
-                    run.choose_views(names)
+                # The run may end meanwhile, of which whoever looks hears.
+                with contextlib.suppress(TomboloError):
+                    run._choose(names)
 
     def _ask(self) -> None:
         """Try, unless it is being tried, is there or was tried just now."""
