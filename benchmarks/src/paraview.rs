@@ -45,10 +45,11 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
         run.steps(|| paraview.has_left(), [Duration::ZERO, CHANGE])?;
         let without = run.steps(|| true, [TURN, 2 * TURN])?.whole.median();
         paraview.follow()?;
-        let before = paraview.shown();
-        run.steps(|| paraview.shown() > before, [Duration::ZERO, CHANGE])?;
+        let before = paraview.shown()?;
+        let has_come = || paraview.shown().is_ok_and(|shown| shown > before);
+        run.steps(has_come, [Duration::ZERO, CHANGE])?;
         let with = run.steps(|| true, [TURN, 2 * TURN])?.whole.median();
-        shown += paraview.shown() - before;
+        shown += paraview.shown()? - before;
         alone.add(without);
         followed.add(with);
         ratios.add(with / without);
@@ -108,23 +109,21 @@ impl Paraview {
     }
 
     /// How many steps it has shown.
-    fn shown(&self) -> usize {
-        self.lines().iter().filter(|line| line.parse::<usize>().is_ok()).count()
+    fn shown(&self) -> Result<usize, Box<dyn Error>> {
+        Ok(self.lines()?.iter().filter(|line| line.parse::<usize>().is_ok()).count())
     }
 
     /// Whether it has no connection, as it has said last.
     fn has_left(&self) -> bool {
-        self.lines().last().is_some_and(|line| line == "left")
+        self.lines().is_ok_and(|lines| lines.last().is_some_and(|line| line == "left"))
     }
 
-    /// What it has printed.
-    fn lines(&self) -> Vec<String> {
-        let mut printed = Vec::new();
-        let size = self.printed.metadata().map_or(0, |it| it.len());
-        printed.resize(usize::try_from(size).unwrap_or(0), 0);
+    /// The lines that ParaView's Python has printed so far.
+    fn lines(&self) -> Result<Vec<String>, Box<dyn Error>> {
+        let mut printed = vec![0; usize::try_from(self.printed.metadata()?.len())?];
         // Where it writes stays where it is: both have the same file.
-        let _ = self.printed.read_exact_at(&mut printed, 0);
-        String::from_utf8_lossy(&printed).lines().map(str::to_owned).collect()
+        self.printed.read_exact_at(&mut printed, 0)?;
+        Ok(String::from_utf8(printed)?.lines().map(str::to_owned).collect())
     }
 }
 

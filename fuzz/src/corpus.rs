@@ -39,8 +39,8 @@ pub(crate) fn read(target: Target) -> io::Result<Vec<Vec<u8>>> {
     Ok(inputs)
 }
 
-/// Writes the inputs of a target, the shortest first. Of more than a thousand only every second, third, ... is kept,
-/// and those beyond 4 MiB are left out.
+/// Writes the inputs of a target, the shortest first. Of more than a thousand only every second, third,
+/// ... is kept, and those beyond 4 MiB are left out.
 ///
 /// # Errors
 /// Where the file cannot be written.

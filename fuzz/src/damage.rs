@@ -165,7 +165,7 @@ fn value_damage(value: &mut Value, other: &Value, random: &mut Random) {
             }
             Value::Object(members) => object(members, &taken(), random),
             Value::String(text) => {
-                // What grows from pass to pass must not grow for ever.
+                // An input that is kept is damaged again: its texts must not become ever longer.
                 let most = (1 << random.below(12)).min(LARGEST / text.len().max(1));
                 *text = text.repeat(1 + random.below(most));
             }
