@@ -11,7 +11,7 @@ use tombolo::{
     Adaptor, ExecuteError, OrderStatus, Settings, Step,
     communicator::{Communicator, threads},
     deform::{
-        mesh::{ArrayView, CellsView, FeatureSource, Indices, MeshView, Values},
+        mesh::{ArrayView, CellsView, FeatureSource, MeshView, Values},
         shapes::box_of_tets,
     },
     pipelines::{
@@ -87,16 +87,16 @@ impl Lent {
         ];
         let cells = CellsView::Mixed {
             types: &self.types,
-            offsets: Indices::I32(&self.offsets),
-            connectivity: Indices::I32(&self.connectivity),
+            offsets: (&self.offsets).into(),
+            connectivity: (&self.connectivity).into(),
         };
         let points = ArrayView::interleaved(Values::F64(&self.points), self.components)
             .expect("whole tuples");
         let mesh = MeshView {
             generation: self.generation,
             ghost_cells: Some(&self.ghosts),
-            global_vertices: Some(Indices::I64(&self.numbers)),
-            global_cells: Some(Indices::I64(&self.cell_numbers)),
+            global_vertices: Some((&self.numbers).into()),
+            global_cells: Some((&self.cell_numbers).into()),
             ..MeshView::new(points, cells)
         };
         let mesh = mesh.with_features(&self.features);

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use tombolo::{
     Adaptor, ExecuteError, InitializeError, OrderStatus, Parameter, Settings, Step,
     deform::{
-        mesh::{ArrayView, CellType, CellsView, Indices, MeshView, Vector},
+        mesh::{ArrayView, CellType, CellsView, MeshView, Vector},
         quality::quality,
         shapes::box_of_tets,
     },
@@ -499,7 +499,7 @@ fn squeezed(
     let mut adaptor = Adaptor::initialize(settings).expect("initialize");
     let mut reached = points.to_vec();
     for cycle in 0..4 {
-        let cells = CellsView::Uniform { cell_type, connectivity: Indices::U32(connectivity) };
+        let cells = CellsView::Uniform { cell_type, connectivity: connectivity.into() };
         let channels = [Channel {
             name: "solid",
             mesh: MeshView::new(ArrayView::vectors(&reached), cells),

@@ -1,5 +1,5 @@
-//! What the adaptor costs a solver in Python at steps at which nothing is due, and the memory that
-//! lending a mesh takes.
+//! What the adaptor costs a solver in Python at steps at which nothing is due, the memory that lending
+//! a mesh takes, and how many frames a second a client in Python gets, beside Rerun.
 
 use std::error::Error;
 use std::fs;
@@ -10,15 +10,26 @@ use tombolo_tests::{project, target};
 
 use crate::peer;
 use crate::report::{Line, Report, Target};
+use crate::stream;
 
 /// Cubes along an edge, each of six tetrahedra: 1 296 000 of them, and a hundredth of that.
 const SIZES: [u32; 2] = [60, 13];
 const CALLS: u32 = 20_000;
 const NEVER: u64 = 1_000_000_000_000;
 
+/// A line of the table.
+#[derive(Serialize)]
+#[serde(untagged)]
+pub enum Row {
+    /// A mesh that is shown at steps at which nothing is due.
+    Lent(Lent),
+    /// A surface that changes at each step, streamed to a client.
+    Streamed(stream::Row),
+}
+
 /// A mesh that is shown at steps at which nothing is due.
 #[derive(Serialize)]
-pub struct Row {
+pub struct Lent {
     case: &'static str,
     #[serde(flatten)]
     measured: Measured,
@@ -38,10 +49,10 @@ struct Measured {
     mesh_bytes: u64,
 }
 
-/// Runs the benchmark on the package that `scripts/python --release` compiles; about a minute.
+/// Runs the benchmark on the package that `scripts/python --release` compiles; some three minutes.
 ///
 /// # Errors
-/// The first error of building and running.
+/// The first error of building and running; a peer that is missing is an error.
 pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
     peer::run(std::process::Command::new(project().join("scripts/python")).arg("--release"))?;
     let directory = target().join("benchmark-python");
@@ -60,26 +71,30 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
         let file = directory.join("pipelines.json");
         fs::write(&file, config)?;
         for size in SIZES {
-            rows.push(Row { case, measured: measure(&file, size)? });
+            rows.push(Lent { case, measured: measure(&file, size)? });
         }
     }
     let slowest = rows.iter().map(|row| row.measured.seconds).fold(0.0, f64::max);
     let [lent, kept] = match rows.as_slice() {
         [large, small, watched_large, watched_small] => {
-            let growth =
-                |of: &Row, than: &Row| (of.measured.added_bytes - than.measured.added_bytes) as f64;
+            let growth = |of: &Lent, than: &Lent| {
+                (of.measured.added_bytes - than.measured.added_bytes) as f64
+            };
             let mesh = large.measured.mesh_bytes as f64;
             [growth(large, small), growth(watched_large, watched_small) / mesh]
         }
         _ => [f64::NAN; 2],
     };
-    let targets = vec![
+    let streamed = stream::without_pause()?;
+    let mut targets = vec![
         Target::at_most("execute from Python with nothing due [s]", slowest, 5e-6),
         // The least of the mesh's arrays has 1.8 MB: it would be seen, were it copied.
         Target::at_most("bytes more that lending 1 296 000 tets takes than 13 182", lent, 1e6),
         Target::at_most("the reference that a server keeps for orders [meshes]", kept, 2.0),
     ];
-    Ok(Report { rows, targets })
+    targets.extend(stream::targets(&streamed));
+    let lent = rows.into_iter().map(Row::Lent);
+    Ok(Report { rows: lent.chain(streamed.into_iter().map(Row::Streamed)).collect(), targets })
 }
 
 fn measure(config: &Path, size: u32) -> Result<Measured, Box<dyn Error>> {
@@ -90,20 +105,41 @@ fn measure(config: &Path, size: u32) -> Result<Measured, Box<dyn Error>> {
 }
 
 impl Line for Row {
-    const HEADINGS: &'static [&'static str] =
-        &["case", "tets", "median [s]", "p95 [s]", "added [MB]", "peak [MB]", "own mesh [MB]"];
+    const HEADINGS: &'static [&'static str] = &[
+        "case",
+        "cells",
+        "call [s]",
+        "p95 [s]",
+        "added [MB]",
+        "peak [MB]",
+        "own mesh [MB]",
+        "frames/s",
+    ];
 
     fn cells(&self) -> Vec<String> {
-        let Measured { tets, seconds, p95, added_bytes, peak_bytes, mesh_bytes } = self.measured;
         let megabytes = |bytes: f64| format!("{:.1}", bytes / 1e6);
-        vec![
-            self.case.to_owned(),
-            tets.to_string(),
-            format!("{seconds:.2e}"),
-            format!("{p95:.2e}"),
-            megabytes(added_bytes as f64),
-            megabytes(peak_bytes as f64),
-            megabytes(mesh_bytes as f64),
-        ]
+        match self {
+            Row::Lent(Lent { case, measured }) => {
+                let Measured { tets, seconds, p95, added_bytes, peak_bytes, mesh_bytes } = measured;
+                vec![
+                    (*case).to_owned(),
+                    tets.to_string(),
+                    format!("{seconds:.2e}"),
+                    format!("{p95:.2e}"),
+                    megabytes(*added_bytes as f64),
+                    megabytes(*peak_bytes as f64),
+                    megabytes(*mesh_bytes as f64),
+                    String::new(),
+                ]
+            }
+            Row::Streamed(row) => {
+                let (peer, triangles, seconds, frames) = row.throughput();
+                let mut cells = vec![format!("streamed by {peer}"), triangles.to_string()];
+                cells.push(format!("{seconds:.2e}"));
+                cells.resize(Self::HEADINGS.len() - 1, String::new());
+                cells.push(format!("{frames:.1}"));
+                cells
+            }
+        }
     }
 }

@@ -60,27 +60,48 @@ struct Measured {
 /// The first error of building and running; a peer that is missing is an error.
 pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
     peer::run(Command::new(project().join("scripts/python")).arg("--release"))?;
-    let directory = target().join("benchmark-stream");
-    fs::create_dir_all(&directory)?;
     let mut rows = Vec::new();
     for (triangles, without_pause) in SIZES {
         for (change, steps, pause) in
             [("values", STEPS, PAUSE), ("points", STEPS, PAUSE), ("points", without_pause, 0.0)]
         {
-            let mut rounds: [Vec<Measured>; 3] = Default::default();
-            for _ in 0..ROUNDS {
-                for (peer, rounds) in PEERS.into_iter().zip(&mut rounds) {
-                    let numbers = [triangles.to_string(), steps.to_string(), pause.to_string()];
-                    rounds.push(measure(peer, &numbers, change, &directory)?);
-                }
-            }
-            for (peer, rounds) in PEERS.into_iter().zip(&rounds) {
-                rows.push(Row { peer, change, pause, measured: median(rounds)? });
-            }
+            rows.extend(of_peers(triangles, change, steps, pause)?);
         }
     }
     let targets = targets(&rows);
     Ok(Report { rows, targets })
+}
+
+/// The streams of all peers of surfaces whose points change, without a pause: how many frames a
+/// second a client gets.
+pub(crate) fn without_pause() -> Result<Vec<Row>, Box<dyn Error>> {
+    let mut rows = Vec::new();
+    for (triangles, steps) in SIZES {
+        rows.extend(of_peers(triangles, "points", steps, 0.0)?);
+    }
+    Ok(rows)
+}
+
+/// A stream by each peer, which take turns.
+fn of_peers(
+    triangles: u32,
+    change: &'static str,
+    steps: u32,
+    pause: f64,
+) -> Result<Vec<Row>, Box<dyn Error>> {
+    let directory = target().join("benchmark-stream");
+    fs::create_dir_all(&directory)?;
+    let numbers = [triangles.to_string(), steps.to_string(), pause.to_string()];
+    let mut rounds: [Vec<Measured>; 3] = Default::default();
+    for _ in 0..ROUNDS {
+        for (peer, rounds) in PEERS.into_iter().zip(&mut rounds) {
+            rounds.push(measure(peer, &numbers, change, &directory)?);
+        }
+    }
+    let row = |(peer, rounds): (_, &Vec<_>)| {
+        median(rounds).map(|measured| Row { peer, change, pause, measured })
+    };
+    PEERS.into_iter().zip(&rounds).map(row).collect()
 }
 
 fn measure(
@@ -112,7 +133,7 @@ fn median(rounds: &[Measured]) -> Result<Measured, Box<dyn Error>> {
 }
 
 /// Ours beside Rerun's that logs what changes alone.
-fn targets(rows: &[Row]) -> Vec<Target> {
+pub(crate) fn targets(rows: &[Row]) -> Vec<Target> {
     let mut targets = Vec::new();
     for [ours, _, theirs] in rows.as_chunks::<3>().0 {
         let (change, pause) = (ours.change, ours.pause);
@@ -131,6 +152,14 @@ fn targets(rows: &[Row]) -> Vec<Target> {
         }
     }
     targets
+}
+
+impl Row {
+    /// Its peer, how many triangles there are, the median of a call in seconds, and frames a second.
+    pub(crate) fn throughput(&self) -> (&'static str, u64, f64, f64) {
+        let Measured { triangles, seconds, frames_a_second, .. } = self.measured;
+        (self.peer, triangles, seconds, frames_a_second)
+    }
 }
 
 impl Line for Row {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use tombolo_deform::communicator::Solo;
 use tombolo_deform::mesh::{
-    ArrayView, CellType, Cells, CellsView, FeatureSource, Indices, Mesh, MeshView, Values, Vector,
+    ArrayView, CellType, Cells, CellsView, FeatureSource, Mesh, MeshView, Values, Vector,
 };
 use tombolo_deform::shapes;
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Input, Kept, Snapshot, Source};
@@ -155,10 +155,8 @@ fn a_surface_follows_borrowed_arrays() {
     let fields =
         [FieldView::vertex("velocity", ArrayView::interleaved(Values::F32(&velocity), 3).unwrap())];
     let points = ArrayView::interleaved(Values::F32(&coordinates), 3).unwrap();
-    let cells = CellsView::Uniform {
-        cell_type: CellType::Tetra,
-        connectivity: Indices::I64(&connectivity),
-    };
+    let cells =
+        CellsView::Uniform { cell_type: CellType::Tetra, connectivity: (&connectivity).into() };
     let channel = Channel { name: "fluid", mesh: MeshView::new(points, cells), fields: &fields };
     let channels = [channel];
     let mut runner = runner(
@@ -343,10 +341,8 @@ fn trouble_is_told_once_by_name_and_stops_nothing() {
 fn a_broken_mesh_is_an_error() {
     let mesh = shapes::box_of_tets([1, 1, 1], [0.0; 3], [1.0; 3]);
     let connectivity = [0i32, 1, 2, 99];
-    let cells = CellsView::Uniform {
-        cell_type: CellType::Tetra,
-        connectivity: Indices::I32(&connectivity),
-    };
+    let cells =
+        CellsView::Uniform { cell_type: CellType::Tetra, connectivity: connectivity[..].into() };
     let channels = [Channel {
         name: "fluid",
         mesh: MeshView::new(ArrayView::vectors(mesh.points()), cells),

@@ -29,6 +29,54 @@ pub struct Array<'call> {
     call: PhantomData<&'call [u8]>,
 }
 
+/// A piece of memory as numbers, and where those of an array are among them.
+struct Span<'call, T> {
+    values: &'call [T],
+    first: usize,
+    /// Rows and columns.
+    shape: [usize; 2],
+    /// From one row and from one column to the next, in numbers.
+    strides: [isize; 2],
+}
+
+impl<'call, T> Span<'call, T> {
+    /// The numbers, where one lies beside the other.
+    fn compact(&self) -> Option<&'call [T]> {
+        let [rows, columns] = self.shape;
+        (columns == 1 && (rows <= 1 || self.strides[0] == 1)).then_some(self.values)
+    }
+
+    /// Takes numbers into a fingerprint, where one lies beside the other; says whether they do.
+    fn fingerprint(&self, into: &mut Fingerprint, number: impl Fn(T) -> i64) -> bool
+    where
+        T: Copy,
+    {
+        let compact = self.compact();
+        if let Some(values) = compact {
+            into.integers(values.len(), |index| number(values[index]));
+        }
+        compact.is_some()
+    }
+
+    /// The numbers of a list: among which values, from which on, and how far apart.
+    fn list(
+        self,
+        values: impl Fn(&'call [T]) -> Values<'call>,
+    ) -> Option<(Values<'call>, usize, isize)> {
+        (self.shape[1] == 1).then(|| (values(self.values), self.first, self.strides[0]))
+    }
+
+    fn indices(&self) -> Option<Indices<'call>>
+    where
+        Indices<'call>: From<&'call [T]>,
+    {
+        match self.compact() {
+            Some(values) => Some(values.into()),
+            None => Indices::from(self.values).table(self.first, self.shape, self.strides).ok(),
+        }
+    }
+}
+
 impl<'call> Array<'call> {
     /// Numbers at an address, of which those of a big-endian machine are turned round as they are
     /// read.
@@ -183,42 +231,50 @@ impl<'call> Array<'call> {
         self.integer(index).and_then(|value| u64::try_from(value).ok())
     }
 
-    /// The values in memory as a slice, where they can be seen as one: every `stride`-th of it is
-    /// one of them.
-    fn slice<T>(&self) -> Option<(&'call [T], usize)> {
+    /// The memory in which the values lie as a slice of numbers of their type, where it can be seen
+    /// as one.
+    fn span<T>(&self) -> Option<Span<'call, T>> {
         let size = size_of::<T>();
         if size != self.number.bytes() || self.swapped {
             return None;
         }
-        if self.count == 0 {
-            return Some((&[], 1));
+        let (columns, of_column) = self.columns;
+        let rows = self.count / columns;
+        if rows == 0 {
+            return Some(Span { values: &[], first: 0, shape: [0, columns], strides: [1; 2] });
         }
-        if self.columns.0 > 1 {
+        let bytes = size.cast_signed();
+        // A distance that is never gone need not be one of whole numbers.
+        let distance = |count: usize, stride: isize| match count {
+            1 => Some(0),
+            _ => (stride % bytes == 0).then_some(stride / bytes),
+        };
+        let strides = [distance(rows, self.stride)?, distance(columns, of_column)?];
+        let far = |count: usize, stride: isize| (count - 1).cast_signed().checked_mul(stride);
+        let [down, along] = [far(rows, strides[0])?, far(columns, strides[1])?];
+        let before = down.min(0).checked_add(along.min(0))?.unsigned_abs();
+        let length = down.unsigned_abs().checked_add(along.unsigned_abs())?.checked_add(1)?;
+        let lowest = self.first.wrapping_sub(before.checked_mul(size)?);
+        if !lowest.addr().is_multiple_of(align_of::<T>()) {
             return None;
         }
-        let stride = if self.count == 1 { size } else { usize::try_from(self.stride).ok()? };
-        if !stride.is_multiple_of(size)
-            || stride == 0
-            || !self.first.addr().is_multiple_of(align_of::<T>())
-        {
-            return None;
-        }
-        let length = (self.count - 1) * (stride / size) + 1;
-        // SAFETY: aligned; the last of the values is the last element of the slice, and what lies
-        // between two of them lies between two addresses of the solver's array (`new`), live and
-        // unchanged during the call. Every pattern of bits is a number.
-        Some((unsafe { std::slice::from_raw_parts(self.first.cast::<T>(), length) }, stride / size))
+        // SAFETY: aligned; the first and the last element are the lowest and the highest of the
+        // values in memory, and what lies between them lies between two addresses of the solver's
+        // array (`new`, `table`), live and unchanged during the call. Every pattern of bits is a
+        // number.
+        let values = unsafe { std::slice::from_raw_parts(lowest.cast::<T>(), length) };
+        Some(Span { values, first: before, shape: [rows, columns], strides })
     }
 
-    /// The values as the adaptor borrows them, with the distance between two; `None` where they
-    /// have to be copied.
-    pub(super) fn values(&self) -> Option<(Values<'call>, usize)> {
+    /// The values as the adaptor borrows them, where the first of them is, and the distance between
+    /// two; `None` where they have to be copied.
+    pub(super) fn values(&self) -> Option<(Values<'call>, usize, isize)> {
         match self.number {
-            NumberType::F32 => self.slice().map(|(values, stride)| (Values::F32(values), stride)),
-            NumberType::F64 => self.slice().map(|(values, stride)| (Values::F64(values), stride)),
-            NumberType::I32 => self.slice().map(|(values, stride)| (Values::I32(values), stride)),
-            NumberType::I64 => self.slice().map(|(values, stride)| (Values::I64(values), stride)),
-            NumberType::U8 => self.slice().map(|(values, stride)| (Values::U8(values), stride)),
+            NumberType::F32 => self.span().and_then(|span| span.list(Values::F32)),
+            NumberType::F64 => self.span().and_then(|span| span.list(Values::F64)),
+            NumberType::I32 => self.span().and_then(|span| span.list(Values::I32)),
+            NumberType::I64 => self.span().and_then(|span| span.list(Values::I64)),
+            NumberType::U8 => self.span().and_then(|span| span.list(Values::U8)),
             NumberType::I8
             | NumberType::I16
             | NumberType::U16
@@ -227,24 +283,23 @@ impl<'call> Array<'call> {
         }
     }
 
-    /// The values as vertex numbers, one beside the other; `None` where they have to be copied.
+    /// The values as vertex numbers; `None` where they have to be copied.
     pub(super) fn indices(&self) -> Option<Indices<'call>> {
-        if !self.is_compact() {
-            return None;
-        }
         match self.number {
-            NumberType::I32 => self.slice().map(|(values, _)| Indices::I32(values)),
-            NumberType::I64 => self.slice().map(|(values, _)| Indices::I64(values)),
-            NumberType::U32 => self.slice().map(|(values, _)| Indices::U32(values)),
-            NumberType::U64 => self.slice().map(|(values, _)| Indices::U64(values)),
+            NumberType::I32 => self.span::<i32>()?.indices(),
+            NumberType::I64 => self.span::<i64>()?.indices(),
+            NumberType::U32 => self.span::<u32>()?.indices(),
+            NumberType::U64 => self.span::<u64>()?.indices(),
             _ => None,
         }
     }
 
-    /// Whether its numbers lie one beside the other.
-    fn is_compact(&self) -> bool {
-        let beside = self.stride == self.number.bytes().cast_signed();
-        self.count <= 1 || self.columns.0 == 1 && beside
+    /// The values as bytes one beside the other; `None` where they have to be copied.
+    pub(super) fn bytes(&self) -> Option<&'call [u8]> {
+        match self.number {
+            NumberType::U8 => self.span().and_then(|span| span.compact()),
+            _ => None,
+        }
     }
 
     /// Where the first and the last value lie.
@@ -267,17 +322,16 @@ impl<'call> Array<'call> {
     /// Takes the values into a fingerprint, whatever their type and wherever each lies.
     pub(super) fn fingerprint(&self, into: &mut Fingerprint) {
         into.add(self.count as u64);
-        match self.indices() {
-            Some(Indices::U32(values)) => {
-                into.integers(values.len(), |index| i64::from(values[index]));
-            }
-            Some(Indices::I32(values)) => {
-                into.integers(values.len(), |index| i64::from(values[index]));
-            }
-            Some(Indices::I64(values)) => into.integers(values.len(), |index| values[index]),
-            _ => into.integers(self.count, |index| {
+        let is_taken = match self.number {
+            NumberType::I32 => self.span().is_some_and(|span| span.fingerprint(into, i32::into)),
+            NumberType::U32 => self.span().is_some_and(|span| span.fingerprint(into, u32::into)),
+            NumberType::I64 => self.span().is_some_and(|span| span.fingerprint(into, i64::into)),
+            _ => false,
+        };
+        if !is_taken {
+            into.integers(self.count, |index| {
                 self.integer(index).unwrap_or(self.get(index).to_bits().cast_signed())
-            }),
+            });
         }
     }
 }

@@ -9,7 +9,7 @@ use pyo3::types::{PyList, PyMapping, PyString, PyTuple};
 use tombolo::deform::mesh::{CellType, Vector};
 use tombolo::foreign::mesh::{
     Block, COMPONENTS, Channel, Coordset, Domain, Faces, Field, Label, Lending, Mask, Roles, Rows,
-    Topology,
+    Topology, Types,
 };
 use tombolo::foreign::{Array, NumberType};
 use tombolo::pipelines::extract::{Association, check_field_length};
@@ -231,7 +231,7 @@ impl Lender {
         let of_types = entries.drain(..).map(|[key, value]| {
             self.uniform(cell_type(&key, what)?, &value, format!("{what}['{key}']"))
         });
-        Ok(Topology::Types(of_types.collect::<Read<_>>()?))
+        Ok(Topology::Types(Types::new(of_types.collect::<Read<_>>()?)))
     }
 
     /// The named parts of the boundary, and the names by their numbers.

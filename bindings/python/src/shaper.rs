@@ -12,7 +12,7 @@ use tombolo::deform::features::{FeatureSettings, check_feature_names, misplaced_
 use tombolo::deform::mesh::{self, FeatureSource, Mesh, Vector};
 use tombolo::deform::number::Number;
 use tombolo::deform::quality::{quality, scaled_jacobians};
-use tombolo::deform::shape::{Refused, Request};
+use tombolo::deform::shape::{CurrentStage, Refused, Request, Stage};
 use tombolo::deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
 use tombolo::deform::surface::{Surface, SurfaceError};
 use tombolo::pipelines::files::read_displacements;
@@ -30,6 +30,7 @@ pub(crate) struct Shaper {
     mesh: Arc<Mesh>,
     surface: Arc<Surface>,
     cancellation: Cancellation,
+    stage: CurrentStage,
     /// Coordinates of a vertex as they were given.
     dimension: usize,
 }
@@ -144,8 +145,9 @@ impl Shaper {
                 let shaper = tombolo::deform::shape::Shaper::new(&mesh, Arc::clone(&surface))
                     .map_err(mistake)?;
                 let shaper = shaper.with_clock(tombolo::steering::clock).in_plane(dimension == 2);
-                let cancellation = shaper.cancellation().clone();
-                Ok(Self { shaper: Mutex::new(shaper), mesh, surface, cancellation, dimension })
+                let (cancellation, stage) = (shaper.cancellation().clone(), shaper.stage().clone());
+                let shaper = Mutex::new(shaper);
+                Ok(Self { shaper, mesh, surface, cancellation, stage, dimension })
             })
         })
     }
@@ -260,6 +262,11 @@ impl Shaper {
         Ok(dict)
     }
 
+    /// The name of the stage that the work under way is at, from any thread.
+    fn stage(&self) -> &'static str {
+        self.stage.get().name()
+    }
+
     /// Has the work under way given up, from any thread.
     fn cancel(&self) {
         self.cancellation.cancel();
@@ -269,6 +276,7 @@ impl Shaper {
     fn renew(&self) -> PyResult<()> {
         let _held = self.hold()?;
         self.cancellation.renew();
+        self.stage.enter(Stage::Surface);
         Ok(())
     }
 }

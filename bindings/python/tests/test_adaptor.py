@@ -44,6 +44,8 @@ def layouts(values):
         "strided": wide[:, 1::2],
         "read only": frozen,
         "transposed": np.ascontiguousarray(values.T).T,
+        "reversed": values[::-1].copy()[::-1],
+        "one for all": np.broadcast_to(values[:1], values.shape),
     }
 
 
@@ -66,17 +68,29 @@ def test_fields_of_any_layout_are_borrowed_where_they_lie(dtype):
 
 
 @pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint32, np.uint64])
-def test_cells_of_one_type_are_borrowed_where_row_follows_row(dtype):
+def test_cells_of_any_layout_are_borrowed_where_they_lie(dtype):
+    quads = np.array([[0, 1, 3, 2]], dtype)
     for name, cells in layouts(TETS.astype(dtype)).items():
-        is_borrowed = name in ("rows", "read only")
-        assert arrays(mesh(cells={"tetra": cells}), "cells") == [[cells.ctypes.data, cells.size, is_borrowed]], name
+        lies = [cells.ctypes.data, cells.size, True]
+        assert arrays(mesh(cells={"tetra": cells}), "cells") == [lies], name
+        of_types = mesh(cells={"quad": quads, "tetra": cells})
+        assert arrays(of_types, "cells") == [[quads.ctypes.data, 4, True], lies], name
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_cells_in_vtk_form_are_borrowed_where_they_lie(dtype):
+    offsets = np.arange(0, TETS.size + 1, 4, dtype=dtype)
+    connectivity, types = TETS.ravel().astype(dtype), np.full(len(TETS), 10, np.uint8)
+    cells = {"connectivity": connectivity, "offsets": offsets, "types": types}
+    lies = [[array.ctypes.data, array.size, True] for array in (connectivity, offsets, types)]
+    assert sorted(arrays(mesh(cells=cells), "cells")) == sorted(lies)
 
 
 def test_other_cells_are_copied():
     offsets, types = np.arange(0, TETS.size + 1, 4), np.full(len(TETS), 10)
     for cells in (
         {"tetra": TETS.astype(np.int16)},
-        {"tetra": TETS, "pyramid": np.empty((0, 5), int)},
+        {"tetra": TETS.astype(">i4"), "pyramid": np.empty((0, 5), int)},
         {"connectivity": TETS.ravel(), "offsets": offsets, "types": types},
     ):
         lent = arrays(mesh(cells=cells), "cells")
@@ -102,10 +116,12 @@ def test_fields_are_borrowed_by_their_length():
         lambda a: np.frombuffer(b"\0" + a.tobytes(), a.dtype, offset=1).reshape(a.shape),
         lambda a: a.tolist(),
         lambda a: np.repeat(a, 2, axis=0)[::2],
+        lambda a: np.asfortranarray(a),
+        lambda a: a[:, ::-1].copy()[:, ::-1] if a.ndim > 1 else a,
     ],
 )
-def test_what_cannot_be_borrowed_is_copied_right(strange):
-    """What is written of a mesh in a strange form is what is written of the plain one."""
+def test_arrays_in_strange_forms_are_read_right(strange):
+    """What is found of a mesh in a strange form, borrowed or copied, is what is found of the plain one."""
     written = []
     for points, cells in ((POINTS, TETS), (strange(POINTS), strange(TETS))):
         pipeline = {

@@ -210,12 +210,29 @@ def test_what_is_no_mesh_is_told():
         shaper.quality("nonsense")
 
 
+def test_long_work_tells_what_it_is_at():
+    points, tets = box(20)
+    told = []
+    faces = ends(points, tets)
+    shaper = tombolo.Shaper(points, {"tetra": tets}, faces, progress=lambda *now: told.append(now))
+    assert told and {stage for stage, _ in told} == {"mesh"}
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 60}}]
+    told.clear()
+    shape = shaper.shape(turn, progress=lambda *now: told.append(now), guard={"min_scaled_jacobian": 0.1})
+    stages, seconds = zip(*told)
+    assert stages[0] == "surface" and {"volume"} <= set(stages) <= {"surface", "volume", "guard"}
+    assert list(seconds) == sorted(seconds) and sum(shape.details["seconds"].values()) > 0.1 * (len(told) - 2)
+    told.clear()
+    shaper.skeleton(progress=lambda *now: told.append(now))
+    assert told and {stage for stage, _ in told} == {"skeleton"}
+
+
 def test_long_work_tells_how_long_and_is_given_up():
     points, tets = box(14)
     shaper, seconds = shaper_of(points, tets, ends(points, tets)), []
     turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 45}}]
 
-    def progress(elapsed):
+    def progress(stage, elapsed):
         seconds.append(elapsed)
         raise KeyboardInterrupt
 
@@ -245,7 +262,7 @@ def test_a_refused_call_of_another_thread_takes_no_cancellation_back():
     shaper, refused = shaper_of(points, tets, ends(points, tets)), []
     turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 45}}]
 
-    def progress(elapsed):
+    def progress(stage, elapsed):
         if elapsed > 0.05 and not refused:
             shaper.cancel()
             with pytest.raises(tombolo.CallError, match="in another call"):

@@ -91,8 +91,8 @@ impl Part {
     pub fn view(&self) -> crate::mesh::MeshView<'_> {
         use crate::mesh::{ArrayView, CellsView, Indices, MeshView};
         MeshView {
-            global_vertices: self.global_vertices.as_deref().map(Indices::U64),
-            global_cells: self.global_cells.as_deref().map(Indices::U64),
+            global_vertices: self.global_vertices.as_deref().map(Indices::from),
+            global_cells: self.global_cells.as_deref().map(Indices::from),
             ghost_cells: self.ghosts.as_deref(),
             grid_boxes: &self.grid_boxes,
             ..MeshView::new(ArrayView::vectors(&self.points), CellsView::Owned(&self.cells))

@@ -127,7 +127,8 @@ impl Values<'_> {
     }
 }
 
-/// One component of an [`ArrayView`]: every `stride`-th value from `offset` on.
+/// One component of an [`ArrayView`]: every `stride`-th value from `offset` on, in two's
+/// complement.
 #[derive(Debug, Clone, Copy)]
 struct Column<'a> {
     values: Values<'a>,
@@ -180,14 +181,14 @@ impl<'a> ArrayView<'a> {
     }
 
     /// `len` tuples whose components each have their own values, offset and stride (in values, not
-    /// bytes).
+    /// bytes; negative where the last tuple lies first).
     ///
     /// # Errors
-    /// [`MeshError::ArrayLength`] where a component's values end before its last one, or there are
-    /// none or more than 9.
+    /// [`MeshError::ArrayLength`] where a component has a tuple that is not among its values, or
+    /// there are none or more than 9.
     pub fn strided(
         len: usize,
-        components: &[(Values<'a>, usize, usize)],
+        components: &[(Values<'a>, usize, isize)],
     ) -> Result<Self, MeshError> {
         let Some(&(first, _, _)) = components.first().filter(|_| components.len() <= 9) else {
             return Err(MeshError::ArrayLength {
@@ -198,20 +199,21 @@ impl<'a> ArrayView<'a> {
         };
         let mut columns = [Column { values: first, offset: 0, stride: 1 }; 9];
         for (column, &(values, offset, stride)) in columns.iter_mut().zip(components) {
-            let needed = match len {
-                0 => Some(0),
-                _ => (len - 1)
-                    .checked_mul(stride)
-                    .and_then(|span| span.checked_add(offset)?.checked_add(1)),
+            let last = || {
+                let span = isize::try_from(len - 1).ok()?.checked_mul(stride)?;
+                offset.checked_add_signed(span)
             };
-            if needed.is_none_or(|needed| needed > values.len()) {
+            let is_within =
+                len == 0 || offset < values.len() && last().is_some_and(|last| last < values.len());
+            if !is_within {
                 return Err(MeshError::ArrayLength {
-                    name: "component".into(),
+                    name: format!("component at {offset}, a value every {stride}"),
                     found: values.len(),
-                    expected: needed.unwrap_or(usize::MAX),
+                    expected: len,
                 });
             }
-            *column = Column { values, offset, stride };
+            // Added in two's complement, a negative distance leads back.
+            *column = Column { values, offset, stride: stride.cast_unsigned() };
         }
         let number = first.number();
         let is_of_one = components.iter().all(|(values, ..)| values.number() == number);
@@ -262,7 +264,7 @@ impl<'a> ArrayView<'a> {
             "tuple {tuple}, component {component}"
         );
         let column = &self.columns[component];
-        column.values.get(column.offset + tuple * column.stride)
+        column.values.get(column.offset.wrapping_add(tuple.wrapping_mul(column.stride)))
     }
 
     /// A tuple as a vector; components that the array lacks are 0, so that plane coordinates lie at

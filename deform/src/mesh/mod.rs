@@ -16,6 +16,7 @@ mod domain;
 mod feature;
 pub mod ghosts;
 mod handedness;
+mod indices;
 mod ordered;
 mod other_order;
 mod shared;
@@ -31,12 +32,13 @@ pub use cells::Cells;
 pub use domain::Domain;
 pub use feature::{FeatureSource, TaggedFaces, TaggedVertices};
 pub(crate) use handedness::is_left_handed;
+pub use indices::Indices;
 #[cfg(test)]
 pub(crate) use ordered::shuffled;
 pub(crate) use ordered::{Numbering, Ordered};
 pub use other_order::OtherOrder;
 pub use shared::SharedVertices;
-pub use view::{CellsView, Indices, MeshView};
+pub use view::{CellsView, MeshView};
 
 /// An unstructured mesh that owns its arrays. To clone a mesh copies none of them.
 ///

@@ -2,102 +2,8 @@
 
 use std::ops::Range;
 
-use super::{ArrayView, CellType, Cells, FeatureSource, Mesh, MeshError, ghosts};
+use super::{ArrayView, CellType, Cells, FeatureSource, Indices, Mesh, MeshError, ghosts};
 use crate::bounds::Bounds;
-
-/// Vertex or cell numbers of any common integer type, borrowed.
-#[derive(Debug, Clone, Copy)]
-pub enum Indices<'a> {
-    /// 32-bit signed.
-    I32(&'a [i32]),
-    /// 64-bit signed.
-    I64(&'a [i64]),
-    /// 32-bit unsigned.
-    U32(&'a [u32]),
-    /// 64-bit unsigned.
-    U64(&'a [u64]),
-}
-
-impl Indices<'_> {
-    /// How many numbers there are.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        match self {
-            Indices::I32(values) => values.len(),
-            Indices::I64(values) => values.len(),
-            Indices::U32(values) => values.len(),
-            Indices::U64(values) => values.len(),
-        }
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// One number; a negative one becomes a number beyond any mesh, which validation then names.
-    ///
-    /// # Panics
-    /// Where `index` is out of range.
-    #[must_use]
-    pub fn get(&self, index: usize) -> u64 {
-        match self {
-            Indices::I32(values) => u64::try_from(values[index]).unwrap_or(u64::MAX),
-            Indices::I64(values) => u64::try_from(values[index]).unwrap_or(u64::MAX),
-            Indices::U32(values) => u64::from(values[index]),
-            Indices::U64(values) => values[index],
-        }
-    }
-
-    /// A number as it is told to people: negative ones in two's complement.
-    pub(super) fn signed(&self, index: usize) -> u64 {
-        match self {
-            Indices::I32(values) => i64::from(values[index]).cast_unsigned(),
-            Indices::I64(values) => values[index].cast_unsigned(),
-            Indices::U32(_) | Indices::U64(_) => self.get(index),
-        }
-    }
-
-    fn address(&self) -> usize {
-        match self {
-            Indices::I32(values) => values.as_ptr().addr(),
-            Indices::I64(values) => values.as_ptr().addr(),
-            Indices::U32(values) => values.as_ptr().addr(),
-            Indices::U64(values) => values.as_ptr().addr(),
-        }
-    }
-}
-
-macro_rules! indices {
-    ($($type:ty: $indices:ident),*) => {$(
-        impl<'a> From<&'a [$type]> for Indices<'a> {
-            fn from(values: &'a [$type]) -> Self {
-                Indices::$indices(values)
-            }
-        }
-
-        impl<'a> From<&'a Vec<$type>> for Indices<'a> {
-            fn from(values: &'a Vec<$type>) -> Self {
-                Indices::$indices(values)
-            }
-        }
-
-        impl<'a, const N: usize> From<&'a [[$type; N]]> for Indices<'a> {
-            fn from(values: &'a [[$type; N]]) -> Self {
-                Indices::$indices(values.as_flattened())
-            }
-        }
-
-        impl<'a, const N: usize> From<&'a Vec<[$type; N]>> for Indices<'a> {
-            fn from(values: &'a Vec<[$type; N]>) -> Self {
-                Indices::$indices(values.as_flattened())
-            }
-        }
-    )*};
-}
-
-indices!(i32: I32, i64: I64, u32: U32, u64: U64);
 
 /// Cells borrowed from the solver.
 #[derive(Debug, Clone, Copy)]
@@ -109,6 +15,9 @@ pub enum CellsView<'a> {
         /// The vertices, cell after cell.
         connectivity: Indices<'a>,
     },
+    /// Those of one type, which has a fixed number of vertices, after those of another: for each
+    /// type the vertices, cell after cell.
+    Types(&'a [(CellType, Indices<'a>)]),
     /// Any mix of types but polyhedra.
     Mixed {
         /// VTK's number of each cell's type.
@@ -127,8 +36,9 @@ impl CellsView<'_> {
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
-            CellsView::Uniform { cell_type, connectivity } => {
-                connectivity.len() / cell_type.vertex_count().unwrap_or(1)
+            CellsView::Uniform { cell_type, connectivity } => count(*cell_type, connectivity),
+            CellsView::Types(types) => {
+                types.iter().map(|(cell_type, connectivity)| count(*cell_type, connectivity)).sum()
             }
             CellsView::Mixed { types, .. } => types.len(),
             CellsView::Owned(cells) => cells.len(),
@@ -147,23 +57,44 @@ impl CellsView<'_> {
     /// [`MeshError::UnknownCellType`], [`MeshError::Offsets`], [`MeshError::VertexCount`] or
     /// [`MeshError::VertexNumber`] with the first cell that is wrong.
     pub fn to_cells(&self) -> Result<Cells, MeshError> {
-        let vertex = |cell: usize, number: u64| {
-            u32::try_from(number).map_err(|_| MeshError::VertexNumber {
+        self.copied(u32::MAX as usize)
+    }
+
+    /// A copy of the cells of a mesh of so many vertices, on which errors alone depend.
+    fn copied(self, vertex_count: usize) -> Result<Cells, MeshError> {
+        let vertex = |cell: usize, numbers: &Indices<'_>, index: usize| {
+            let vertex = || numbers.signed(index);
+            u32::try_from(numbers.get(index)).map_err(|_| MeshError::VertexNumber {
                 cell,
-                vertex: number,
-                vertex_count: u32::MAX as usize,
+                vertex: vertex(),
+                vertex_count,
             })
         };
-        match *self {
+        match self {
             CellsView::Owned(cells) => Ok(cells.clone()),
             CellsView::Uniform { cell_type, connectivity } => {
                 let size = cell_type.vertex_count().unwrap_or(1);
                 // Not collected: that would set aside up to twice as much, without knowing how much.
                 let mut vertices = Vec::with_capacity(connectivity.len());
                 for index in 0..connectivity.len() {
-                    vertices.push(vertex(index / size, connectivity.get(index))?);
+                    vertices.push(vertex(index / size, &connectivity, index)?);
                 }
                 Cells::uniform(cell_type, vertices)
+            }
+            CellsView::Types(types) => {
+                let mut cells = Cells::new();
+                let mut row = Vec::new();
+                for (cell_type, connectivity) in types {
+                    let size = cell_type.vertex_count().unwrap_or(1);
+                    for first in (0..connectivity.len()).step_by(size) {
+                        row.clear();
+                        for index in first..(first + size).min(connectivity.len()) {
+                            row.push(vertex(cells.len(), connectivity, index)?);
+                        }
+                        cells.push(*cell_type, &row)?;
+                    }
+                }
+                Ok(cells)
             }
             CellsView::Mixed { types, offsets, connectivity } => {
                 let mut cells = Cells::new();
@@ -173,7 +104,7 @@ impl CellsView<'_> {
                     let (cell_type, range) = mixed_cell(cell, types, offsets, connectivity.len())?;
                     row.clear();
                     for index in range {
-                        row.push(vertex(cell, connectivity.get(index))?);
+                        row.push(vertex(cell, &connectivity, index)?);
                     }
                     cells.push(cell_type, &row)?;
                 }
@@ -181,20 +112,11 @@ impl CellsView<'_> {
             }
         }
     }
+}
 
-    /// Where the connectivity lies in memory and how long it is: what tells, without looking at a
-    /// value, that a solver hands over the same cells as in the step before.
-    #[must_use]
-    pub fn identity(&self) -> (usize, usize) {
-        match self {
-            CellsView::Uniform { connectivity, .. } | CellsView::Mixed { connectivity, .. } => {
-                (connectivity.address(), connectivity.len())
-            }
-            CellsView::Owned(cells) => {
-                (cells.connectivity().as_ptr().addr(), cells.connectivity().len())
-            }
-        }
-    }
+/// How many cells of a type there are.
+fn count(cell_type: CellType, connectivity: &Indices<'_>) -> usize {
+    connectivity.len() / cell_type.vertex_count().unwrap_or(1)
 }
 
 /// A mesh borrowed from the solver for the length of one call.
@@ -298,7 +220,8 @@ impl<'a> MeshView<'a> {
     /// # Errors
     /// As [`CellsView::to_cells`] and [`Mesh::new`].
     pub fn to_mesh(&self) -> Result<Mesh, MeshError> {
-        Mesh::new(self.points.to_vectors(), self.cells.to_cells()?, self.features.clone())
+        let cells = self.cells.copied(self.points.len())?;
+        Mesh::new(self.points.to_vectors(), cells, self.features.clone())
     }
 }
 

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::view::{check_length, mixed_cell};
-use super::{ArrayView, Cells, CellsView, FeatureSource, Indices, MeshError, MeshView};
+use super::{ArrayView, CellType, Cells, CellsView, FeatureSource, Indices, MeshError, MeshView};
 
 /// Values looked at together.
 const CHUNK: usize = 1024;
@@ -67,19 +67,9 @@ impl CellsView<'_> {
         match *self {
             CellsView::Owned(_) => Ok(()),
             CellsView::Uniform { cell_type, connectivity } => {
-                let expected = "a type with a fixed vertex count";
-                let size = cell_type.vertex_count().ok_or(MeshError::CellType {
-                    cell: 0,
-                    found: cell_type,
-                    expected,
-                })?;
-                let (cell, found) = (connectivity.len() / size, connectivity.len() % size);
-                if found > 0 {
-                    Err(MeshError::VertexCount { cell, cell_type, found })
-                } else {
-                    Ok(())
-                }
+                check_whole(&[(cell_type, connectivity)])
             }
+            CellsView::Types(types) => check_whole(types),
             CellsView::Mixed { types, offsets, connectivity } => {
                 check_length("offsets", offsets.len(), types.len() + 1)?;
                 let (start, end, length) =
@@ -109,15 +99,9 @@ impl CellsView<'_> {
         match *self {
             CellsView::Owned(cells) => cells.validate(vertex_count),
             CellsView::Uniform { cell_type, connectivity } => {
-                let size = cell_type.vertex_count().unwrap_or(1);
-                in_range(connectivity, 0..connectivity.len(), vertex_count).map_err(
-                    |(index, vertex)| MeshError::VertexNumber {
-                        cell: index / size,
-                        vertex,
-                        vertex_count,
-                    },
-                )
+                types_in_range(&[(cell_type, connectivity)], vertex_count)
             }
+            CellsView::Types(types) => types_in_range(types, vertex_count),
             CellsView::Mixed { types, offsets, connectivity } => {
                 for cell in 0..types.len() {
                     let (cell_type, range) = mixed_cell(cell, types, offsets, connectivity.len())?;
@@ -137,6 +121,28 @@ impl CellsView<'_> {
         }
     }
 
+    /// A number that tells, without a look at a value, that a solver hands over the same cells as
+    /// in the step before: of where the connectivity lies in memory, and how.
+    #[must_use]
+    pub fn identity(&self) -> u64 {
+        let mut hash = Hash::default();
+        let mut add = |numbers: &[usize]| {
+            numbers.iter().for_each(|&number| hash.add(number as u64));
+        };
+        match self {
+            CellsView::Uniform { connectivity, .. } | CellsView::Mixed { connectivity, .. } => {
+                add(&connectivity.location());
+            }
+            CellsView::Types(types) => {
+                types.iter().for_each(|(_, connectivity)| add(&connectivity.location()));
+            }
+            CellsView::Owned(cells) => {
+                add(&[cells.connectivity().as_ptr().addr(), cells.connectivity().len()]);
+            }
+        }
+        hash.0
+    }
+
     /// A number that other cells almost certainly do not have: of their types and vertices, in
     /// their order. One pass.
     #[must_use]
@@ -151,12 +157,11 @@ impl CellsView<'_> {
                 });
             }
             CellsView::Uniform { cell_type, connectivity } => {
-                let size = cell_type.vertex_count().unwrap_or(1);
-                for index in 0..connectivity.len() {
-                    if index % size == 0 {
-                        hash.add(u64::from(cell_type.vtk()));
-                    }
-                    hash.add(connectivity.get(index));
+                hash.add_cells(cell_type, connectivity);
+            }
+            CellsView::Types(types) => {
+                for &(cell_type, connectivity) in types {
+                    hash.add_cells(cell_type, connectivity);
                 }
             }
             CellsView::Mixed { types, offsets, connectivity } => {
@@ -241,6 +246,42 @@ fn in_range(numbers: Indices<'_>, range: Range<usize>, count: usize) -> Result<(
     beyond.map_or(Ok(()), |(index, _)| Err((index, numbers.signed(index))))
 }
 
+/// Refuses types of which the vertices make no whole number of cells.
+fn check_whole(types: &[(CellType, Indices<'_>)]) -> Result<(), MeshError> {
+    let mut cells = 0;
+    for &(cell_type, connectivity) in types {
+        let expected = "a type with a fixed vertex count";
+        let size = cell_type.vertex_count().ok_or(MeshError::CellType {
+            cell: cells,
+            found: cell_type,
+            expected,
+        })?;
+        cells += connectivity.len() / size;
+        let found = connectivity.len() % size;
+        if found > 0 {
+            return Err(MeshError::VertexCount { cell: cells, cell_type, found });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses the first cell of these types that names a vertex beyond the last.
+fn types_in_range(types: &[(CellType, Indices<'_>)], vertex_count: usize) -> Result<(), MeshError> {
+    let mut first = 0;
+    for &(cell_type, connectivity) in types {
+        let size = cell_type.vertex_count().unwrap_or(1);
+        in_range(connectivity, 0..connectivity.len(), vertex_count).map_err(
+            |(index, vertex)| MeshError::VertexNumber {
+                cell: first + index / size,
+                vertex,
+                vertex_count,
+            },
+        )?;
+        first += connectivity.len() / size;
+    }
+    Ok(())
+}
+
 /// FNV-1a of whole numbers.
 struct Hash(u64);
 
@@ -251,9 +292,103 @@ impl Default for Hash {
 }
 
 impl Hash {
+    fn add_cells(&mut self, cell_type: CellType, connectivity: Indices<'_>) {
+        let size = cell_type.vertex_count().unwrap_or(1);
+        for index in 0..connectivity.len() {
+            if index % size == 0 {
+                self.add(u64::from(cell_type.vtk()));
+            }
+            self.add(connectivity.get(index));
+        }
+    }
+
     fn add(&mut self, number: u64) {
         self.0 = (self.0 ^ number).wrapping_mul(0x0100_0000_01b3);
         // The product's low bits know nothing of the number's high ones.
         self.0 ^= self.0 >> 29;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETS: [[i32; 4]; 3] = [[0, 1, 2, 4], [1, 3, 2, 5], [2, 4, 5, 6]];
+    const HEXAHEDRON: [u64; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+    /// The tetrahedra and the hexahedron as the kernel owns them.
+    fn owned() -> Cells {
+        let mut cells = Cells::new();
+        for tet in TETS {
+            cells.push(CellType::Tetra, &tet.map(|vertex| vertex as u32)).unwrap();
+        }
+        cells.push(CellType::Hexahedron, &HEXAHEDRON.map(|vertex| vertex as u32)).unwrap();
+        cells
+    }
+
+    /// The same tetrahedra, vertex by vertex as arrays of Fortran have them.
+    fn columns() -> Vec<i32> {
+        (0..4).flat_map(|corner| TETS.map(|tet| tet[corner])).collect()
+    }
+
+    #[test]
+    fn cells_of_several_types_are_those_in_every_layout() {
+        let owned = owned();
+        let columns = columns();
+        let columns = Indices::from(&columns).table(0, [3, 4], [1, 3]).unwrap();
+        let hexahedron = (CellType::Hexahedron, Indices::from(&HEXAHEDRON[..]));
+        for tets in [Indices::from(&TETS[..]), columns] {
+            let types = [(CellType::Tetra, tets), hexahedron, (CellType::Pyramid, Indices::EMPTY)];
+            let view = CellsView::Types(&types);
+            assert_eq!(view.len(), 4);
+            assert_eq!(view.to_cells().unwrap(), owned);
+            assert_eq!(view.fingerprint(), CellsView::Owned(&owned).fingerprint());
+            view.validate(8).unwrap();
+            let found = view.validate(7).unwrap_err();
+            let expected = MeshError::VertexNumber { cell: 3, vertex: 7, vertex_count: 7 };
+            assert_eq!(found, expected);
+            let uniform = CellsView::Uniform { cell_type: CellType::Tetra, connectivity: tets };
+            let alone = TETS.as_flattened().iter().map(|&vertex| vertex as u32).collect();
+            let alone = Cells::uniform(CellType::Tetra, alone).unwrap();
+            assert_eq!(uniform.to_cells().unwrap(), alone);
+        }
+    }
+
+    #[test]
+    fn what_makes_no_whole_cells_of_a_type_is_refused() {
+        let tets = (CellType::Tetra, Indices::from(&TETS[..]));
+        let wrong = (CellType::Hexahedron, Indices::from(&HEXAHEDRON[..7]));
+        let types = [tets, wrong];
+        let expected =
+            MeshError::VertexCount { cell: 3, cell_type: CellType::Hexahedron, found: 7 };
+        assert_eq!(CellsView::Types(&types).check_lengths().unwrap_err(), expected);
+        assert_eq!(CellsView::Types(&types).to_cells().unwrap_err(), expected);
+        let types = [tets, (CellType::Polygon, Indices::EMPTY)];
+        let found = CellsView::Types(&types).check_lengths().unwrap_err();
+        assert!(matches!(found, MeshError::CellType { cell: 3, .. }), "{found}");
+    }
+
+    #[test]
+    fn a_vertex_below_0_is_told_as_it_was_given() {
+        let points = [[0.0; 3]; 4];
+        let cells = [[0, 1, 2, -1]];
+        let error = MeshView::tets(&points[..], &cells[..]).to_mesh().unwrap_err().to_string();
+        assert!(error.contains("-1") && error.contains('4'), "{error}");
+    }
+
+    #[test]
+    fn the_same_numbers_in_another_layout_are_other_cells() {
+        let numbers = [0_u32; 24];
+        let whole = Indices::from(&numbers[..]);
+        let of = |connectivity: Indices<'_>| {
+            CellsView::Uniform { cell_type: CellType::Tetra, connectivity }.identity()
+        };
+        let (near, far) = (whole.table(0, [3, 4], [4, 1]), whole.table(0, [3, 4], [8, 1]));
+        let (near, far) = (near.unwrap(), far.unwrap());
+        assert_eq!(of(near), of(whole.table(0, [3, 4], [4, 1]).unwrap()));
+        assert_ne!(of(near), of(far));
+        let types = [(CellType::Tetra, near), (CellType::Quad, far)];
+        let others = [(CellType::Tetra, near), (CellType::Quad, near)];
+        assert_ne!(CellsView::Types(&types).identity(), CellsView::Types(&others).identity());
     }
 }

@@ -89,7 +89,7 @@ def run(steps, cells=6, time_step=0.05, orders=None, seen=None, output=None):
     facets = heat.mesh.facets
     lent = tombolo.Mesh(
         heat.mesh.p.T,  # (vertices, 3), borrowed as it lies
-        {"tetra": np.ascontiguousarray(heat.mesh.t.T)},  # borrowed: row after row
+        {"tetra": heat.mesh.t.T},  # borrowed as it lies
         {"temperature": heat.temperature},
         faces={"top": facets[:, heat.top].T, "bottom": facets[:, heat.bottom].T},
     )

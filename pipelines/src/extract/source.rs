@@ -124,7 +124,7 @@ pub(crate) struct Whole {
 /// cells and vertices there are, and the generation that the solver counts up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MeshKey {
-    identity: (usize, usize),
+    identity: u64,
     cells: usize,
     points: usize,
     generation: u64,

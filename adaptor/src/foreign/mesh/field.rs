@@ -30,14 +30,13 @@ fn number(components: &[Array<'_>]) -> NumberType {
 /// Components as they lie in the solver's memory, where each can be lent.
 pub(super) fn lent<'call>(components: &[Array<'call>]) -> Option<ArrayView<'call>> {
     // Vectors as most solvers have them: looked at as one list, they are read several times as fast.
-    if let Some((values, _)) = Array::interleaved(components).and_then(|all| all.values()) {
+    if let Some((values, ..)) = Array::interleaved(components).and_then(|all| all.values()) {
         return ArrayView::interleaved(values, components.len()).ok();
     }
-    let mut columns: [(Values<'call>, usize, usize); COMPONENTS] =
+    let mut columns: [(Values<'call>, usize, isize); COMPONENTS] =
         [(Values::U8(&[]), 0, 1); COMPONENTS];
     for (column, array) in columns.iter_mut().zip(components) {
-        let (values, stride) = array.values()?;
-        *column = (values, 0, stride);
+        *column = array.values()?;
     }
     ArrayView::strided(components.first()?.len(), columns.get(..components.len())?).ok()
 }

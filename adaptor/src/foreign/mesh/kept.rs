@@ -11,7 +11,6 @@ use tombolo_deform::mesh::{
 use tombolo_pipelines::extract::{ABSENT, Association, FieldView, GHOST_FIELD};
 
 use super::channel::Channel;
-use super::domain::Domain;
 use super::field::{self, Field};
 use crate::foreign::array::{Array, Fingerprint, NumberType};
 use crate::foreign::error::RunError;
@@ -64,7 +63,8 @@ pub(crate) struct Kept {
     /// That of the cells which passed last, and their generation: others are told from these.
     passed: Option<(Fingerprint, u64)>,
     counts: (usize, usize),
-    address: usize,
+    /// Of the cells that are lent ([`CellsView::identity`]).
+    identity: u64,
     generation: u64,
     newest_generation: u64,
     cells: Option<Cells>,
@@ -88,7 +88,8 @@ impl Kept {
         }
         let counts = counts(channel);
         let single = channel.single();
-        let lent_cells = single.and_then(|domain| domain.topology.lent().map(|_| address(domain)));
+        let lent_cells =
+            single.and_then(|domain| domain.topology.lent().map(|cells| cells.identity()));
         let lent_points = single.is_some_and(|domain| domain.coordset.lent().is_some());
         channel.check_memory()?;
         let fingerprint = channel.fingerprint();
@@ -117,7 +118,7 @@ impl Kept {
                 }
             };
             self.cells = None;
-            self.address = lent_cells.unwrap_or(0);
+            self.identity = lent_cells.unwrap_or(0);
             // Those that are lent are checked by the adaptor.
             if lent_cells.is_none() {
                 self.cells = Some(cells(channel, &self.points)?);
@@ -125,7 +126,7 @@ impl Kept {
             self.marks = marks(channel)?;
             self.boxes.clone_from(&channel.boxes);
             self.fingerprint = Some(fingerprint);
-        } else if self.cells.is_none() && lent_cells.is_none_or(|address| address != self.address) {
+        } else if self.cells.is_none() && lent_cells.is_none_or(|lent| lent != self.identity) {
             // A solver that copies its cells anew for each step, or has them in another form now:
             // one copy here, by which they are known from now on.
             self.cells = Some(cells(channel, &self.points_of(channel))?);
@@ -227,7 +228,7 @@ impl Kept {
             (Some(kept), _) => CellsView::Owned(kept),
             (None, None) => CellsView::Uniform {
                 cell_type: tombolo_deform::mesh::CellType::Tetra,
-                connectivity: Indices::U32(&[]),
+                connectivity: Indices::EMPTY,
             },
         };
         for field in single.iter().flat_map(|domain| &domain.fields).chain(&channel.of_mesh) {
@@ -254,8 +255,8 @@ impl Kept {
             cells,
             features,
             generation: self.generation,
-            global_vertices: global_vertices.as_deref().map(Indices::U64),
-            global_cells: global_cells.as_deref().map(Indices::U64),
+            global_vertices: global_vertices.as_deref().map(Indices::from),
+            global_cells: global_cells.as_deref().map(Indices::from),
             ghost_cells: ghosts.as_deref(),
             grid_boxes: &self.boxes,
         }
@@ -279,10 +280,6 @@ impl Channel<'_> {
 fn counts(channel: &Channel<'_>) -> (usize, usize) {
     let cells = channel.blocks.iter().map(|block| block.domain.topology.cell_count()).sum();
     (channel.vertex_count(), cells)
-}
-
-fn address(domain: &Domain<'_>) -> usize {
-    domain.topology.arrays().first().map_or(0, |array| array.address())
 }
 
 /// The cells of all blocks, one block after the other.

@@ -20,6 +20,6 @@ pub use field::{COMPONENTS, Field};
 pub(super) use kept::Kept;
 pub use levels::{Grid, Mask};
 pub use rows::Rows;
-pub use topology::Topology;
+pub use topology::{Topology, Types};
 
 pub use super::label::Label;

@@ -1,6 +1,6 @@
 //! Rows of different lengths: what `connectivity`, `sizes` and `offsets` describe.
 
-use tombolo_deform::mesh::MeshError;
+use tombolo_deform::mesh::{Indices, MeshError};
 
 use crate::foreign::array::{Array, Fingerprint};
 use crate::foreign::error::RunError;
@@ -49,6 +49,14 @@ impl<'call> Rows<'call> {
         match &self.extents {
             Extents::Sizes(sizes, _) => sizes.len(),
             Extents::Offsets(offsets) => offsets.len().saturating_sub(1),
+        }
+    }
+
+    /// The offsets and the connectivity as they lie in the solver's memory, where they can be lent.
+    pub(super) fn lent(&self) -> Option<(Indices<'call>, Indices<'call>)> {
+        match &self.extents {
+            Extents::Sizes(..) => None,
+            Extents::Offsets(offsets) => Some((offsets.indices()?, self.connectivity.indices()?)),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Cells: of grids, of one shape, mixed, polygonal, polyhedral, points.
 
-use tombolo_deform::mesh::{CellType, Cells, CellsView, Vector};
+use tombolo_deform::mesh::{CellType, Cells, CellsView, Indices, Vector};
 
 use super::polyhedron::turn_outward;
 use super::rows::{Rows, vertex};
@@ -28,8 +28,8 @@ pub enum Topology<'call> {
         /// The connectivity's label in errors.
         label: Label,
     },
-    /// Those of one type after those of another: topologies of uniform cells.
-    Types(Vec<Topology<'call>>),
+    /// Those of one type after those of another.
+    Types(Types<'call>),
     /// Polygons.
     Polygonal(Rows<'call>),
     /// Polyhedra by their faces.
@@ -56,6 +56,28 @@ pub enum Topology<'call> {
     },
 }
 
+/// Topologies of uniform cells, those of one after those of another.
+#[derive(Debug, Clone)]
+pub struct Types<'call> {
+    topologies: Vec<Topology<'call>>,
+    /// The cells of each as they lie in the solver's memory, where all can be lent.
+    lent: Option<Vec<(CellType, Indices<'call>)>>,
+}
+
+impl<'call> Types<'call> {
+    /// Cells of several types; those that are not uniform are copied.
+    #[must_use]
+    pub fn new(topologies: Vec<Topology<'call>>) -> Self {
+        let lent = topologies.iter().map(|topology| match topology {
+            Topology::Uniform { cell_type, connectivity, .. } => {
+                Some((*cell_type, connectivity.indices()?))
+            }
+            _ => None,
+        });
+        Self { lent: lent.collect(), topologies }
+    }
+}
+
 impl<'call> Topology<'call> {
     /// How many cells there are.
     #[must_use]
@@ -66,7 +88,7 @@ impl<'call> Topology<'call> {
             Topology::Uniform { cell_type, connectivity, .. } => {
                 connectivity.len() / cell_type.vertex_count().unwrap_or(1)
             }
-            Topology::Types(types) => types.iter().map(Topology::cell_count).sum(),
+            Topology::Types(types) => types.topologies.iter().map(Topology::cell_count).sum(),
             Topology::Polygonal(rows)
             | Topology::Polyhedral { cells: rows, .. }
             | Topology::Mixed { cells: rows, .. } => rows.count(),
@@ -83,7 +105,7 @@ impl<'call> Topology<'call> {
             Topology::Grid { cells } => cells.iter().filter(|count| **count > 0).count(),
             Topology::Uniform { cell_type, .. } => cell_type.dimension(),
             Topology::Types(types) => {
-                let dimensions = types.iter().map(Topology::dimension);
+                let dimensions = types.topologies.iter().map(Topology::dimension);
                 dimensions.collect::<Result<Vec<_>, _>>()?.into_iter().max().unwrap_or(0)
             }
             Topology::Polygonal(_) => 2,
@@ -116,9 +138,23 @@ impl<'call> Topology<'call> {
     }
 
     /// The cells as they lie in the solver's memory, where they can be lent.
-    pub(super) fn lent(&self) -> Option<CellsView<'call>> {
-        let Topology::Uniform { cell_type, connectivity, .. } = self else { return None };
-        Some(CellsView::Uniform { cell_type: *cell_type, connectivity: connectivity.indices()? })
+    pub(super) fn lent(&self) -> Option<CellsView<'_>> {
+        match self {
+            Topology::Uniform { cell_type, connectivity, .. } => Some(CellsView::Uniform {
+                cell_type: *cell_type,
+                connectivity: connectivity.indices()?,
+            }),
+            Topology::Types(types) => types.lent.as_deref().map(CellsView::Types),
+            Topology::Mixed { cells, shapes, map, faces: None, .. } => {
+                // The kernel knows cells by VTK's numbers.
+                let is_of_vtk = |(number, cell_type): &(i64, CellType)| {
+                    *number == i64::from(cell_type.vtk()) && *cell_type != CellType::Polyhedron
+                };
+                let (offsets, connectivity) = cells.lent().filter(|_| map.iter().all(is_of_vtk))?;
+                Some(CellsView::Mixed { types: shapes.bytes()?, offsets, connectivity })
+            }
+            _ => None,
+        }
     }
 
     /// Adds the cells that `keep` keeps to a copy, their vertices counted from `base` on.
@@ -167,7 +203,7 @@ impl<'call> Topology<'call> {
             }
             Topology::Types(types) => {
                 let mut first = 0;
-                for of_type in types {
+                for of_type in &types.topologies {
                     of_type.append(cells, base, points, &|cell| keep(first + cell))?;
                     first += of_type.cell_count();
                 }
@@ -232,7 +268,9 @@ impl<'call> Topology<'call> {
                 into.add(100 + u64::from(cell_type.vtk()));
                 connectivity.fingerprint(into);
             }
-            Topology::Types(types) => types.iter().for_each(|of_type| of_type.fingerprint(into)),
+            Topology::Types(types) => {
+                types.topologies.iter().for_each(|of_type| of_type.fingerprint(into));
+            }
             Topology::Polygonal(rows) => rows.fingerprint(into),
             Topology::Polyhedral { cells, faces } => {
                 cells.fingerprint(into);
@@ -255,7 +293,7 @@ impl<'call> Topology<'call> {
         match self {
             Topology::Points(_) | Topology::Grid { .. } => Vec::new(),
             Topology::Uniform { connectivity, .. } => vec![connectivity],
-            Topology::Types(types) => types.iter().flat_map(Topology::arrays).collect(),
+            Topology::Types(types) => types.topologies.iter().flat_map(Topology::arrays).collect(),
             Topology::Polygonal(rows) => rows.arrays().collect(),
             Topology::Polyhedral { cells, faces } => cells.arrays().chain(faces.arrays()).collect(),
             Topology::Mixed { cells, shapes, faces, .. } => {

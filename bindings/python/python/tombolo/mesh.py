@@ -82,14 +82,11 @@ class Mesh:
     Notes
     -----
     Points and fields of float32, float64, int32, int64 and uint8 are borrowed in any layout: rows or columns first,
-    with strides, read-only. Those of another type of whole numbers, of another byte order, with negative strides or not
-    aligned are copied at each step that looks at them. Other types, such as float16 and complex numbers, are errors,
-    and so is an array of `numpy.ma` of which values are masked.
-
-    Cells of one type are borrowed where their array is of int32, int64, uint32 or uint64 and C-contiguous; it may be
-    read-only. Others are copied once, and again where they have changed: those in Fortran order or with strides, as
-    ``mesh.t.T`` of scikit-fem, those of several types, and those in VTK's form. `faces`, `vertex_features` and what
-    there is for several ranks are copied likewise.
+    with strides of either sign, read-only. So are cells of int32, int64, uint32 and uint64, of one type or of several,
+    and in VTK's form with its types as uint8. Points and fields of another type of whole numbers, of another byte order
+    or not aligned are copied at each step that looks at them; such cells, `faces`, `vertex_features` and what there is
+    for several ranks are copied once, and again where they have changed. Other types, such as float16 and complex
+    numbers, are errors, and so is an array of `numpy.ma` of which values are masked.
 
     Fields and named parts are read at steps that look at them (`Adaptor.looks_at`), and where the mesh has another size
     than before: what is wrong with one, such as its length, is told then.

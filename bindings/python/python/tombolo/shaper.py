@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["Progress", "Shape", "Shaper", "Skeleton"]
 
 Result = TypeVar("Result")
-Progress = Callable[[float], object]
-"""Called about ten times a second with the seconds so far; what it raises ends the work."""
+Progress = Callable[[str, float], object]
+"""Called about ten times a second with the stage and the seconds so far; what it raises ends the work."""
 
 
 @by_identity
@@ -198,6 +199,13 @@ def _what_it_is(given: Any) -> str:
     return f"a {type(given).__name__}"
 
 
+def _with_stage(progress: Optional[Progress], stage: Callable[[], str]) -> Optional[Callable[[float], object]]:
+    """What is called with the seconds alone."""
+    if progress is None:
+        return None
+    return lambda seconds: progress(stage(), seconds)
+
+
 class Shaper:
     """Gives a mesh other shapes: what `tombolo edit` does, to the bit.
 
@@ -218,6 +226,8 @@ class Shaper:
         With coordinates: named parts of the boundary, as `Mesh` takes them, under either name.
     angle : float, optional
         Name the parts of the surface between edges of so many degrees or more, whatever parts the mesh names.
+    progress : callable, optional
+        As of `shape`, while the mesh is read and its surface found; the stage is `"mesh"`.
 
     Raises
     ------
@@ -245,6 +255,7 @@ class Shaper:
         *,
         features: Optional[Faces] = None,
         angle: Optional[float] = None,
+        progress: Optional[Progress] = None,
     ) -> None:
         if faces is not None and features is not None:
             raise MeshError("features: found faces beside them, expected one of the two: they are the same")
@@ -266,7 +277,8 @@ class Shaper:
         elif isinstance(mesh, Mapping) and "points" not in mesh and len(mesh) != 1:
             raise MeshError(f"found {len(mesh)} meshes ({', '.join(map(str, mesh))}), expected one")
         _check_faces(mesh.faces if isinstance(mesh, Mesh) else mesh.get("faces"))
-        self._shaper = _native.Shaper(mesh, angle)
+        make = functools.partial(_native.Shaper, mesh, angle)
+        self._shaper = in_thread(make, _with_stage(progress, lambda: "mesh"))
 
     # ---- What the mesh is.
 
@@ -290,7 +302,7 @@ class Shaper:
         Parameters
         ----------
         progress : callable, optional
-            As of `shape`.
+            As of `shape`; the stage is `"skeleton"`.
 
         Returns
         -------
@@ -306,7 +318,7 @@ class Shaper:
         CallError
             Another thread is in a call of this shaper.
         """
-        return Skeleton(**self._work(self._shaper.skeleton, progress))
+        return Skeleton(**self._work(self._shaper.skeleton, progress, lambda: "skeleton"))
 
     def quality(self, points: Optional[ArrayLike] = None) -> dict[str, Any]:
         """Measure the scaled Jacobian of the mesh, or of it with other points.
@@ -362,7 +374,8 @@ class Shaper:
             The edits, or an order with its settings, or a JSON file of either. Lengths are in the unit of length of the
             mesh, angles in degrees.
         progress : callable, optional
-            Called at once, and then about ten times a second, with the seconds so far.
+            ``progress(stage, seconds)`` is called at once, and then about ten times a second. The stage is `"surface"`,
+            `"volume"` or `"guard"`, the check of the meshes on the way; it may come back where a mesh is mended.
         **settings : dict
             `deform`: how the volume follows; `guard`: what the mesh must keep to; `schedule`: in how many shapes the
             way is looked at.
@@ -436,10 +449,12 @@ class Shaper:
         """Have the work under way given up, from any thread: it raises `RejectedError`, or forecasts a rejection."""
         self._shaper.cancel()
 
-    def _work(self, call: Callable[[], Result], progress: Optional[Progress]) -> Result:
+    def _work(
+        self, call: Callable[[], Result], progress: Optional[Progress], stage: Optional[Callable[[], str]] = None
+    ) -> Result:
         """A call that can be interrupted: it is given up before the mesh can be used again."""
         self._shaper.renew()
-        return in_thread(call, progress, self._shaper.cancel)
+        return in_thread(call, _with_stage(progress, stage or self._shaper.stage), self._shaper.cancel)
 
     def __repr__(self) -> str:
         return f"<tombolo.Shaper, features: {', '.join(feature['name'] for feature in self.features)}>"
