@@ -620,8 +620,8 @@ fn the_program_lists_what_waits_and_replaces_it() {
         assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");
     }
     for (order, reason) in [
-        (second.as_str(), "waits no more"),
-        (better.as_str(), "waits no more"),
+        (second.as_str(), "no longer waits"),
+        (better.as_str(), "no longer waits"),
         ("nobody", "there is no order 'nobody'"),
     ] {
         let (code, said, _) = call("replace", &[order, "second.json"]);

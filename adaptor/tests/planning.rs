@@ -57,8 +57,8 @@ fn an_order_is_cancelled_while_its_shapes_are_found() {
     solver.step_until_told(&mut viewer, "order", has_status("short", "applied"));
     assert!(solver.motions.iter().all(|(_, _, order)| order == "short"), "{:?}", solver.motions);
     for (id, order, reason) in [
-        ("c3", "short", "waits no more"),
-        ("c4", "long", "waits no more"),
+        ("c3", "short", "no longer waits"),
+        ("c4", "long", "no longer waits"),
         ("c5", "nobody", "there is no order 'nobody'"),
     ] {
         viewer.send(&json!({"id": id, "cancel": {"order": order}}));

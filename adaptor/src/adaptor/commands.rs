@@ -325,7 +325,7 @@ impl Adaptor {
         };
         withdrawn.unwrap_or_else(|| {
             Err(match self.log.has_order(order) {
-                true => format!("order '{order}' waits no more, so that it cannot be taken back"),
+                true => format!("order '{order}' no longer waits, so it cannot be taken back"),
                 false => format!("there is no order '{order}'"),
             })
         })
@@ -407,17 +407,28 @@ impl Intake {
         check_files(&command)?;
         let Command::Order(order) = command else { return Ok(()) };
         if self.is_in_parts {
-            self.queue.ask(Asked { client, id, order: Box::new(order) });
+            if let Some(overtaken) = self.queue.ask(Asked { client, id, order: Box::new(order) }) {
+                tell_overtaken(&self.hub, client, overtaken.id);
+            }
             return Ok(());
         }
         let forecaster =
             self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
         let hub = Arc::clone(&self.hub);
-        forecaster.ask(client, &order, move |forecast| {
-            hub.tell_client(client, move || json!({"forecast": {"id": id, "order": forecast}}));
+        forecaster.ask(client, &order, move |forecast| match forecast {
+            Some(forecast) => {
+                hub.tell_client(client, move || json!({"forecast": {"id": id, "order": forecast}}));
+            }
+            None => tell_overtaken(&hub, client, id),
         });
         Ok(())
     }
+}
+
+/// Tells a client that its forecast was forgotten.
+fn tell_overtaken(hub: &Hub, client: u64, id: Option<String>) {
+    let message = "a later forecast of the same client has taken the place of this one";
+    hub.tell_client(client, move || json!({"error": {"message": message, "id": id}}));
 }
 
 /// Refuses a command from the network that names a file of this machine.

@@ -58,16 +58,17 @@ impl Forecaster {
     }
 
     /// Has `answer` called with what `order` would come to, were it given now. What the same
-    /// `asker` asked for before and was not told yet is forgotten: its answer never comes.
+    /// `asker` asked for before and what has not begun is forgotten, and answered with `None`.
     pub(crate) fn ask(
         &self,
         asker: u64,
         order: &Order,
-        answer: impl FnOnce(Forecast) + Send + 'static,
+        answer: impl FnOnce(Option<Forecast>) + Send + 'static,
     ) {
         let Planning::Beside(jobs) = &self.planning else {
             let reason = "only all ranks together can tell, at a safe point";
-            return answer(Forecast::rejected(reason.into(), None, None, ShapeSeconds::default()));
+            let seconds = ShapeSeconds::default();
+            return answer(Some(Forecast::rejected(reason.into(), None, None, seconds)));
         };
         let Present { defaults, stack, here, own } = lock(&self.present).clone();
         match defaults.request(&stack, here, order) {
@@ -76,7 +77,7 @@ impl Forecaster {
             }
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
-                answer(Forecast::rejected(reason, None, None, seconds));
+                answer(Some(Forecast::rejected(reason, None, None, seconds)));
             }
         }
     }

@@ -97,13 +97,15 @@ impl Queue {
         self.call();
     }
 
-    /// Asks in place of what the same client asked before and was not told yet.
-    pub(crate) fn ask(&self, asked: Asked) {
+    /// Asks in place of what the same client asked before and was not told yet, which is returned.
+    pub(crate) fn ask(&self, asked: Asked) -> Option<Asked> {
         let mut questions = lock(&self.questions);
-        questions.retain(|waiting| waiting.client != asked.client);
+        let before = questions.iter().position(|waiting| waiting.client == asked.client);
+        let overtaken = before.map(|index| questions.remove(index));
         questions.push(asked);
         drop(questions);
         self.call();
+        overtaken
     }
 
     /// All that is asked.

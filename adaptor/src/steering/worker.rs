@@ -43,8 +43,9 @@ pub(crate) enum Done {
 /// How long the end of a run waits for a thread that is at work.
 const END: Duration = Duration::from_secs(2);
 
-/// Takes the answer to a forecast, on the worker's thread.
-pub(crate) type Answer = Box<dyn FnOnce(Forecast) + Send>;
+/// Takes the answer to a forecast, on the worker's thread; `None`, on the thread of the one who asks,
+/// where what the same asker wanted to know later has taken its place.
+pub(crate) type Answer = Box<dyn FnOnce(Option<Forecast>) + Send>;
 
 /// A forecast that waits, and who asked for it.
 struct Question {
@@ -146,10 +147,15 @@ impl Jobs {
     /// Asks for a forecast, in place of what the same asker wanted to know before and was not told
     /// yet.
     pub(crate) fn forecast(&self, asker: u64, asked: PlanRequest, answer: Answer) {
+        let mut overtaken = None;
         self.change(|state| {
-            state.forecasts.retain(|waiting| waiting.asker != asker);
+            let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
+            overtaken = before.and_then(|index| state.forecasts.remove(index));
             state.forecasts.push_back(Question { asker, asked, answer });
         });
+        if let Some(Question { answer, .. }) = overtaken {
+            answer(None);
+        }
     }
 }
 
@@ -289,7 +295,7 @@ fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queu
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
             Job::Forecast(Question { asked, answer, .. }) => {
                 let forecast = lock(planner).forecast(&asked);
-                answer(forecast);
+                answer(Some(forecast));
                 continue;
             }
             Job::Ahead(asked) => {

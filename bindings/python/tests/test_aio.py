@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import tombolo
@@ -92,16 +93,10 @@ def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
     late = threading.Timer(30.0, let_through)
 
     async def ask(aio):
-        send, is_sent = aio._send, asyncio.Event()
-
-        async def send_and_tell(*asked):
-            sent = await send(*asked)
-            is_sent.set()
-            return sent
-
-        aio._send = send_and_tell
         forecast = asyncio.create_task(aio.forecast(SQUEEZE))
-        await asyncio.wait_for(is_sent.wait(), 20)
+        begun = time.monotonic()
+        while aio.run._foretells is None and time.monotonic() < begun + 20:
+            await asyncio.sleep(0.01)
         # It waits for the answer now.
         await asyncio.sleep(0.1)
         forecast.cancel()
@@ -117,9 +112,33 @@ def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
             begun = time.monotonic()
             asyncio.run(ask(run.aio))
             assert time.monotonic() - begun < 25
+            # The next one has its turn.
+            let_through()
+            assert run.forecast(SQUEEZE, timeout=60).outcome == "applied"
     finally:
         late.cancel()
         relay.server.close()
+
+
+def test_forecasts_at_once_are_all_answered(begin):
+    running = begin(step=0.02)
+    amounts = [0.02 * number for number in range(1, 9)]
+
+    def edits(amount):
+        return [{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, -amount]}}]
+
+    with tombolo.connect(running.link) as run:
+        run.wait_for(lambda: run.features, 30)
+
+        async def ask():
+            wanted = [run.aio.forecast(edits(amount), timeout=60) for amount in amounts]
+            return await asyncio.gather(*wanted)
+
+        of_tasks = asyncio.run(ask())
+        with ThreadPoolExecutor(len(amounts)) as pool:
+            of_threads = list(pool.map(lambda amount: run.forecast(edits(amount), timeout=60), amounts))
+        for foretold in (of_tasks, of_threads):
+            assert [forecast["largest_displacement"] for forecast in foretold] == pytest.approx(amounts)
 
 
 def test_events_go_on_after_one_was_waited_for_in_vain(begin):

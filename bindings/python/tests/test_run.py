@@ -117,7 +117,7 @@ def test_an_order_takes_the_place_of_one_that_waits(solver, run):
         second.wait(60)
     better.wait(60)
     assert [edit["translate"]["by"] for edit in run.stack] == [[0, 0, -0.2]]
-    for order, reason in ((second, "waits no more"), ("nobody", "there is no order 'nobody'")):
+    for order, reason in ((second, "no longer waits"), ("nobody", "there is no order 'nobody'")):
         with pytest.raises(tombolo.RejectedError, match=reason):
             run.order(SQUEEZE, replaces=order).wait(60)
 
@@ -327,10 +327,32 @@ def test_a_lost_connection_is_made_again(solver):
         relay.cut()
         assert next(lost).kind == "lost"
         run.order(SQUEEZE).wait(60)
-        assert run.drives
+        assert run.drives and not run.reconnecting
         view = run.wait_for_view("midplane", timeout=30)
         run.wait_for_view("midplane", after=view.cycle, timeout=30)
     relay.server.close()
+
+
+def test_a_connection_that_is_gone_is_not_shown_as_a_good_one(solver):
+    relay = Relay(solver.link)
+    with tombolo.connect(relay.link) as run:
+        run.drive()
+        lost = run.events("lost", timeout=30)
+        relay.server.close()
+        relay.cut()
+        next(lost)
+        assert run.reconnecting and "connecting again" in repr(run) and "driving" not in repr(run)
+        assert "connecting again" in run._repr_html_()
+
+
+def test_a_link_file_that_is_not_there_is_named_with_its_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for given, named in (("run.link", tmp_path / "run.link"), ("~/run.link", tmp_path / "home/run.link")):
+        with pytest.raises(tombolo.LinkError, match=rf"no file '{named}'"):
+            tombolo.connect(given)
+    with pytest.raises(TypeError, match="link: found b'run.link'"):
+        tombolo.connect(b"run.link")
 
 
 def test_ctrl_c_ends_a_wait(solver):

@@ -19,6 +19,8 @@ interface Wish { order: Json | null; stack: Json[]; steering: boolean }
 
 export class Forecasts {
   private asked: string | null = null;
+  /** The names of questions that were overtaken and are not answered yet. */
+  private readonly overtaken = new Set<string>();
   private resting: ReturnType<typeof setTimeout> | undefined;
 
   /** `send` asks for the forecast of an order and says under what name it was asked, or null where nobody can be asked. */
@@ -33,6 +35,7 @@ export class Forecasts {
   /** Another order is composed, or it would start from another shape. */
   private changed({ order, steering }: Wish): void {
     clearTimeout(this.resting);
+    if (this.asked !== null) this.overtaken.add(this.asked);
     this.asked = null;
     if (order === null || !steering) return this.store.dispatch({ type: "forecast cleared" });
     this.store.dispatch({ type: "forecast asked" });
@@ -43,12 +46,15 @@ export class Forecasts {
   }
 
   answer(answer: ForecastAnswer): void {
+    if (answer.id) this.overtaken.delete(answer.id);
     if (this.asked === null || answer.id !== this.asked) return;
     this.store.dispatch({ type: "forecast told", answer: answer.order });
   }
 
   /** The server could not take the question of this name; whether it was one of ours. */
   refused(id: string, reason: string): boolean {
+    // Nobody wants to know any more.
+    if (this.overtaken.delete(id)) return true;
     if (this.asked === null || id !== this.asked) return false;
     this.store.dispatch({ type: "forecast failed", reason });
     return true;

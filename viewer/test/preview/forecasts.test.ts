@@ -48,6 +48,18 @@ describe("a forecast", () => {
     expect(state()).toBe("none");
   });
 
+  it("that was overtaken before it was begun is an error of which nothing is said", () => {
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    ask(2);
+    vi.advanceTimersByTime(1000);
+    expect(forecasts.refused("f1", "a later forecast has taken its place")).toBe(true);
+    expect(state()).toBe("waiting");
+    expect(forecasts.refused("f1", "once more")).toBe(false);
+    forecasts.answer({ id: "f2", order: TOLD });
+    expect(state()).toBe("told");
+  });
+
   it("is asked for again when the shape has changed", () => {
     made.greet({ stack: [{ translate: { features: ["wall"], by: [9, 0, 0] } }] });
     vi.advanceTimersByTime(1000);

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import threading
 import time as clock
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Optional, TypeVar
 
 from . import _json, _native
@@ -210,6 +211,13 @@ class Reader:
         """Have the function called no more."""
         with self.changed:
             self._tells.remove(tell)
+
+    @contextlib.contextmanager
+    def looking_again(self) -> Iterator[None]:
+        """Have whoever waits look again once the block, which nobody looks into meanwhile, has changed something."""
+        with self.changed:
+            yield
+            self._wake()
 
     def carry_out(self, parts: Parts[Result]) -> Result:
         """Carry out a wait in parts."""

@@ -211,6 +211,11 @@ class Watched:
         return self._reader.failure is None and not self._reader.closed
 
     @property
+    def reconnecting(self) -> bool:
+        """Whether the connection was lost, and is being made again: what is known is as old as that."""
+        return self.connected and self._state.lost is not None
+
+    @property
     def missed(self) -> int:
         """How many events made way for newer ones before they were read."""
         return self._reader.missed
@@ -472,5 +477,9 @@ class Watched:
         if self._state.end is not None:
             return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
         cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
-        doing = ", driving" if self.drives else "" if self.connected else ", not connected"
+        doing = ", driving" if self.drives else ""
+        if not self.connected:
+            doing = ", not connected"
+        elif self.reconnecting:
+            doing = ", connecting again"
         return f"<tombolo.Run {place}, {cycle}{doing}>"

@@ -211,16 +211,46 @@ class AsyncOrder:
         return getattr(self.order, name)
 
     async def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
-        """Wait until the solver has been given its last shape, as `Order.wait` does.
+        """Wait until the solver has been given the order's last shape, as `Order.wait` does.
 
-        Parameters, Returns and Raises are as of `Order.wait`.
+        An order that another one, or an undo, goes on from is `applied` then too: see `Order.wait`.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+        until : {"applied", "applying", "computing", "accepted"}
+            How far it has to come.
+
+        Returns
+        -------
+        Order
+            The order itself: `order`.
+
+        Raises
+        ------
+        RejectedError, WaitError, EndedError, LinkError, ValueError
+            As of `Order.wait`.
         """
         return await _carry_out(self.order._run._reader, self.order._wait(timeout, until))
 
     async def cancel(self, *, timeout: Optional[float] = None) -> Command:
-        """Take it back, where it has not begun to move the mesh, and wait until that is done.
+        """Take the order back, where it has not begun to move the mesh, and wait until that is done.
 
-        Parameters, Returns and Raises are as of `Run.cancel`, without `wait`.
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.cancel`.
         """
         return await self.order._run.aio.cancel(self.order, timeout=timeout)
 
@@ -238,7 +268,7 @@ class _Events(AsyncIterator["Event"]):
 
     async def __anext__(self) -> Event:
         while not self._is_over:
-            # It is taken behind the wait: of one that was cancelled the event would be lost.
+            # It is taken after the wait: of one that was cancelled the event would be lost.
             try:
                 await _wait_for(self._reader, lambda: len(self._waiting) > 0, None)
             except CallError:
@@ -295,12 +325,28 @@ class AsyncRun:
     ) -> AsyncOrder:
         """Give an order of a new shape, as `Run.order` does.
 
-        A call that is cancelled while it waits for the wheel gives none. Parameters and Raises are as of `Run.order`.
+        A call that is cancelled while it waits for the wheel gives none.
+
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            As of `Run.order`.
+        schedule, deform, guard : dict, optional
+            As of `Run.order`.
+        replaces : Order, AsyncOrder or str, optional
+            An order that has not begun to move the mesh, whose place this one takes.
+        deadline : int, optional
+            Seconds that it may wait for its turn; it is rejected then.
 
         Returns
         -------
         AsyncOrder
             The order, which has been sent.
+
+        Raises
+        ------
+        ConfigurationError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.order`.
         """
         prepared = await self._prepared(
             edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline
@@ -313,12 +359,20 @@ class AsyncRun:
     async def undo(self, count: SupportsIndex = 1) -> AsyncOrder:
         """Take the last orders back, as `Run.undo` does.
 
-        Parameters and Raises are as of `Run.undo`.
+        Parameters
+        ----------
+        count : int
+            How many orders. The shape is the one before them then, to the bit.
 
         Returns
         -------
         AsyncOrder
             The order that takes them back, which has been sent.
+
+        Raises
+        ------
+        ConfigurationError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.undo`.
         """
         orders = whole(count, "count", 1)
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
@@ -334,31 +388,73 @@ class AsyncRun:
     ) -> Forecast:
         """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes.
 
-        Parameters, Returns and Raises are as of `Run.forecast`.
+        Parameters
+        ----------
+        edits : list of dict, dict or path
+            As of `Run.order`.
+        schedule, deform, guard : dict, optional
+            As of `Run.order`.
+        timeout : float, optional
+            Seconds to wait for the wheel, and then for the answer, at most.
+
+        Returns
+        -------
+        Forecast
+            What the order would come to.
+
+        Raises
+        ------
+        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.forecast`.
         """
         seconds(timeout)
         prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
-        question = await self._send(lambda client: client.forecast(prepared), timeout)
-        return await self._carry_out(self.run._foretold(question, timeout))
+        await self.drive(timeout)
+        return await self._carry_out(self.run._foretold(prepared, timeout))
 
     async def hand_over(self, to: str, timeout: float = 60.0) -> None:
-        """Give the wheel to another client, as `Run.hand_over` does.
+        """Give the wheel to another client, as `Run.hand_over` does; it is there when this returns.
 
-        Parameters and Raises are as of `Run.hand_over`.
+        Parameters
+        ----------
+        to : str
+            The client's name in the run, such as ``c4``.
+        timeout : float
+            Seconds to wait, at most.
+
+        Raises
+        ------
+        NotDriverError, RejectedError, WaitError, EndedError, LinkError
+            As of `Run.hand_over`.
         """
         await _in_thread(lambda: self.run.hand_over(to, timeout))
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
-        """Make a link for somebody else, as `Run.link_for` does.
+        """Make a link for somebody else, as `Run.link_for` does. It opens one browser, once.
 
-        Parameters, Returns and Raises are as of `Run.link_for`.
+        Parameters
+        ----------
+        rights : {"watch", "drive"}
+            Whether that browser only watches, or may be the one that steers.
+        timeout : float
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        str
+            The address: that of this run's own link, with a key in place of its token.
+
+        Raises
+        ------
+        ConfigurationError, RejectedError, WaitError, EndedError, LinkError
+            As of `Run.link_for`.
         """
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
     async def _send(self, send: Callable[[_native.Client], str], timeout: Optional[float] = None) -> str:
         """Take the wheel, and send then: one that was cancelled meanwhile sends nothing."""
         await self.drive(timeout)
-        # Behind the last wait, on the loop: it only queues.
+        # After the last wait, on the loop: it only queues.
         return send(self.run._reader.client)
 
     async def _carry_out(self, parts: Parts[Result]) -> Result:
@@ -372,7 +468,24 @@ class AsyncRun:
     async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it.
 
-        Parameters, Returns and Raises are as of `Run.set`, without `wait`.
+        Parameters
+        ----------
+        parameter : str
+            Its name.
+        value : float
+            Its new value, in the unit that the solver has it in.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError, FailedError
+            As of `Run.set`.
         """
         given = number(value, f"parameter {parameter!r}")
         return await self._give(lambda client: client.set(parameter, given), "set", timeout)
@@ -380,28 +493,84 @@ class AsyncRun:
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """Hold the solver at its next safe point, and wait until it is held.
 
-        Parameters, Returns and Raises are as of `Run.pause`, without `wait`.
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.pause`.
         """
         return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
         """Let the solver go on, and wait until it does.
 
-        Parameters, Returns and Raises are as of `Run.resume`, without `wait`.
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.resume`.
         """
         return await self._give(lambda client: client.resume(), "resume", timeout)
 
     async def stop(self, *, timeout: Optional[float] = None) -> Command:
         """Ask the solver to end, and wait until it was told so.
 
-        Parameters, Returns and Raises are as of `Run.stop`, without `wait`.
+        A run that ends before it has answered is no error.
+
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.stop`.
         """
         return await self._give(lambda client: client.stop(), "stop", timeout)
 
     async def cancel(self, order: Given, *, timeout: Optional[float] = None) -> Command:
         """Take back an order that has not begun to move the mesh, as `Run.cancel` does, and wait until that is done.
 
-        Parameters, Returns and Raises are as of `Run.cancel`, without `wait`.
+        Parameters
+        ----------
+        order : Order, AsyncOrder or str
+            The order, or its id.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.cancel`.
         """
         identity = id_of(order, "order")
         return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
@@ -409,73 +578,198 @@ class AsyncRun:
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
         """Change the pipelines while the run goes on, as `Run.change_pipelines` does, and wait until it is done.
 
-        Parameters, Returns and Raises are as of `Run.change_pipelines`, without `wait`.
+        Parameters
+        ----------
+        change : dict
+            What `Run.change_pipelines` takes: ``{"set": [...]}``, ``{"remove": [...]}`` or ``{"all": [...]}``.
+        timeout : float, optional
+            Seconds to wait, at most.
+
+        Returns
+        -------
+        Command
+            The command, which has taken effect.
+
+        Raises
+        ------
+        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.change_pipelines`.
         """
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
 
     async def drive(self, timeout: Optional[float] = None) -> None:
-        """Take the wheel, as `Run.drive` does.
+        """Take the wheel, as `Run.drive` does: what every command does first.
 
-        Parameters and Raises are as of `Run.drive`.
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds to wait, at most. Left out: as of `Run.drive`.
+
+        Raises
+        ------
+        NotDriverError, WaitError, EndedError, LinkError
+            As of `Run.drive`.
         """
         until = moment_after(WHEEL if timeout is None else timeout)
         while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
             pass
 
     async def surface(self) -> Surface:
-        """Ask for the reference surface: what `Run.surface` is.
+        """Ask for the reference surface, from which all shapes are measured: what `Run.surface` is.
 
-        Returns and Raises are as of `Run.surface`.
+        Returns
+        -------
+        Surface
+            The surface. Its points are in the unit of length of the mesh.
+
+        Raises
+        ------
+        LinkError, EndedError, WaitError
+            As of `Run.surface`.
         """
         return await _in_thread(lambda: self.run.surface)
 
     async def stack(self) -> list[dict[str, Any]]:
         """Ask for the edits that make the present shape: what `Run.stack` is.
 
-        Returns and Raises are as of `Run.stack`.
+        Returns
+        -------
+        list of dict
+            The edits, the oldest first. Lengths are in the unit of length of the mesh, angles in degrees.
+
+        Raises
+        ------
+        EndedError, WaitError, LinkError
+            As of `Run.stack`.
         """
         return await _in_thread(lambda: self.run.stack)
 
     async def pipelines(self) -> list[dict[str, Any]]:
         """Ask for the pipelines as they are now: what `Run.pipelines` is.
 
-        Returns and Raises are as of `Run.pipelines`.
+        Returns
+        -------
+        list of dict
+            The pipelines, as the configuration has them.
+
+        Raises
+        ------
+        EndedError, WaitError, LinkError
+            As of `Run.pipelines`.
         """
         return await _in_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
         """Wait until `found`, which is called on the loop, returns something true, as `Run.wait_for` does.
 
-        Parameters, Returns and Raises are as of `Run.wait_for`.
+        Parameters
+        ----------
+        found : callable
+            Looks at what is known, such as ``lambda: run.status.cycle > 100``. It must not wait itself.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        object
+            What `found` has returned.
+
+        Raises
+        ------
+        WaitError, EndedError, LinkError
+            As of `Run.wait_for`.
         """
         return await _wait_for(self.run._reader, found, timeout)
 
     async def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status.
 
-        Parameters, Returns and Raises are as of `Run.wait_for_cycle`.
+        Parameters
+        ----------
+        cycle : int
+            The step; a number from a table of monitors will do.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        Status
+            The newest status, which may be of a later step.
+
+        Raises
+        ------
+        ConfigurationError, WaitError, EndedError, LinkError
+            As of `Run.wait_for_cycle`.
         """
         return await self._carry_out(self.run._wait_for_cycle(cycle, timeout))
 
     async def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
         """Wait for a frame of a view, and return it, as `Run.wait_for_view` does.
 
-        Parameters, Returns and Raises are as of `Run.wait_for_view`.
+        Parameters
+        ----------
+        name : str
+            The name of the view, one of `Run.view_names`.
+        after : int, optional
+            The step that the frame has to be later than. Left out: one that is there already will do.
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        View
+            The newest frame of the view.
+
+        Raises
+        ------
+        KeyError, CallError, WaitError, EndedError, LinkError
+            As of `Run.wait_for_view`.
         """
         return await self._carry_out(self.run._wait_for_view(name, after, timeout))
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how.
 
-        Parameters, Returns and Raises are as of `Run.wait`.
+        Parameters
+        ----------
+        timeout : float, optional
+            Seconds, at most; without it there is no limit.
+
+        Returns
+        -------
+        dict
+            What `Run.end` is. `how` is `unknown`, and alone, where the run has gone without a word.
+
+        Raises
+        ------
+        WaitError, LinkError
+            As of `Run.wait`.
         """
         return await self._carry_out(self.run._wait_for_end(timeout))
 
     def events(self, *kinds: str) -> AsyncIterator[Event]:
         """Iterate over what the run tells from now on by `async for`; the wait for one event may be cancelled.
 
-        Parameters, Yields and Raises are as of `Run.events`, without `timeout`: `asyncio.wait_for` has one.
+        `asyncio.wait_for` gives such a wait a time limit.
+
+        Parameters
+        ----------
+        *kinds : str
+            Only events of these kinds, which `Event` lists; without any, all.
+
+        Returns
+        -------
+        AsyncIterator of Event
+            Each event, in the order in which they came, until the run ends. Of more than 4096 that wait the oldest make
+            way.
+
+        Raises
+        ------
+        ConfigurationError
+            There are no events of such a kind.
+        CallError
+            The run was closed.
         """
         check_kinds(kinds)
         return _Events(self.run, kinds)

@@ -132,6 +132,8 @@ def _state(run: Run) -> str:
         return str(run.end["how"])
     if not run.connected:
         return "not connected"
+    if run.reconnecting:
+        return "connecting again"
     if status is None:
         return "before its first step"
     running = "stopping" if status.stopped else "paused" if status.paused else "running"

@@ -40,7 +40,7 @@ class Run(Watched):
     """A run that goes on elsewhere, as `connect` returns it.
 
     A thread of its own reads what the run tells, so that `status`, `views` and `monitors` are always the newest. A
-    connection that is lost is made again with growing pauses. Any thread may use it. Every wait ends with Ctrl-C. It
+    connection that is lost is made again with growing pauses. Any thread may use it. Ctrl-C ends every wait. It
     closes with `close`, at the end of a `with` block, once nothing refers to it any more, or with the interpreter; the
     run itself goes on. Commands, questions and waits raise `CallError` once it was closed, and in a process that was
     forked since.
@@ -56,6 +56,9 @@ class Run(Watched):
     """
 
     # ---- Steering.
+
+    #: What stands for the forecast that is under way.
+    _foretells: Optional[object] = None
 
     @property
     def orders(self) -> list[Order]:
@@ -245,11 +248,31 @@ class Run(Watched):
         seconds(timeout)
         prepared = self._prepared(_text(edits, schedule=schedule, deform=deform, guard=guard))
         self.drive(timeout)
-        return self._reader.carry_out(self._foretold(self._reader.client.forecast(prepared), timeout))
+        return self._reader.carry_out(self._foretold(prepared, timeout))
 
-    def _foretold(self, question: str, timeout: Optional[float]) -> Parts[Forecast]:
-        """Wait for the answer to a forecast that was asked for."""
-        kind, data = yield (lambda: self._state.answers.get(question)), timeout, "no answer to the forecast came"
+    def _foretold(self, prepared: _native.Prepared, timeout: Optional[float]) -> Parts[Forecast]:
+        """Ask for a forecast, and wait for the answer.
+
+        A run finds out one at a time for each client, and forgets what has not begun when the next one is asked for. So
+        those of several threads and tasks take turns here.
+        """
+        begin, turn, in_vain = clock.monotonic(), object(), "no answer to the forecast came"
+
+        def has_turn() -> bool:
+            if self._foretells is None:
+                self._foretells = turn
+            return self._foretells is turn
+
+        def answer() -> Optional[tuple[str, Any]]:
+            return self._state.answers.get(question)
+
+        yield has_turn, timeout, in_vain
+        try:
+            question = self._reader.client.forecast(prepared)
+            kind, data = yield answer, left(begin, timeout), in_vain
+        finally:
+            with self._reader.looking_again():
+                self._foretells = None
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])
@@ -341,6 +364,8 @@ class Run(Watched):
             Somebody else steers.
         WaitError
             The solver did not have it in time; it may still.
+        FailedError
+            256 commands of this client have no answer yet, such as those of a loop with ``wait=False``.
         EndedError, LinkError
             As of `drive`.
         """
@@ -406,6 +431,8 @@ class Run(Watched):
     def stop(self, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Ask the solver to end.
 
+        A run that ends before it has answered is no error.
+
         Parameters
         ----------
         wait : bool
@@ -428,7 +455,6 @@ class Run(Watched):
             It did not take effect in time; it may still.
         EndedError, LinkError
             As of `drive`.
-            A run that ends before it has answered is no error.
         """
         return self._give(self._reader.client.stop, "stop", wait, timeout)
 
@@ -609,9 +635,17 @@ def connect(
             run.order([{"translate": {"features": ["throat"], "fixed": ["inlet"], "by": [0, 0, 0.1]}}]).wait()
     """
     text = os.fspath(link)
-    if "://" not in text and not text.startswith("unix:") and os.path.isfile(text):
+    if not isinstance(text, str):
+        raise TypeError(f"link: found {text!r}, expected a text or a path")
+    if "://" not in text and not text.startswith("unix:"):
+        path = os.path.expanduser(text)
+        if not os.path.isfile(path):
+            raise LinkError(
+                f"found no file {os.path.abspath(path)!r}, and no link; expected http://HOST:PORT/?token=TOKEN or a "
+                "file that has it, which a run takes away as it ends"
+            )
         try:
-            with open(text, encoding="utf-8") as file:
+            with open(path, encoding="utf-8") as file:
                 words = file.read(1 << 16).split()
         except (OSError, UnicodeDecodeError) as error:
             raise LinkError(f"{text}: the file cannot be read ({error})") from None

@@ -37,7 +37,7 @@ class Status(NamedTuple):
     quality : dict or None
         The scaled Jacobian of the mesh: `min`, `mean`, and how many cells are `inverted`.
     message : dict
-        The whole message.
+        The whole message, which is not shown with the rest.
     """
 
     cycle: int
@@ -49,6 +49,11 @@ class Status(NamedTuple):
     driver: Optional[str]
     quality: Optional[dict[str, Any]]
     message: dict[str, Any]
+
+    def __repr__(self) -> str:
+        # The message says all of it again, in a thousand characters.
+        shown = ", ".join(f"{name}={value!r}" for name, value in self._asdict().items() if name != "message")
+        return f"Status({shown})"
 
     @classmethod
     def _of(cls, message: dict[str, Any]) -> Status:
@@ -102,6 +107,8 @@ class State:
         self.stack: dict[str, Any] = {}
         self.status: Optional[Status] = None
         self.end: Optional[dict[str, Any]] = None
+        # Why the connection was lost, until it is there again.
+        self.lost: Optional[str] = None
         self.monitors = Monitors()
         self.views: dict[str, View] = {}
         # The triangles, lines and features of each view, which come once as long as they stay the same.
@@ -116,7 +123,9 @@ class State:
         if kind == "frame":
             data = self._view(data)
             self.views[data.name] = data
-        elif kind != "lost":
+        elif kind == "lost":
+            self.lost = data
+        else:
             identity = data.get("id")
             is_known = kind != "unknown"
             kind, data = next((key, value) for key, value in data.items() if key != "id")
@@ -129,6 +138,7 @@ class State:
 
     def _take_message(self, kind: str, data: Any, identity: Optional[str]) -> None:
         if kind == "hello":
+            self.lost = None
             for report in data.pop("orders", []):
                 self._take_order(report)
             self.stack = data.get("stack", self.stack)
