@@ -92,6 +92,15 @@ def test_values_of_parameters_are_those_told_last():
     assert before["parameters"][0]["value"] == 10
 
 
+def test_a_status_is_shown_without_the_whole_message():
+    state = State()
+    told = {"cycle": 3, "time": 0.5, "driver": "c1", "pipelines": [{"name": "midplane"}]}
+    state.take("known", {"status": told})
+    assert state.status.message == told
+    known = "cycle=3, time=0.5, paused=False, stopped=False, step_seconds=None, viewers=0, driver='c1', quality=None"
+    assert repr(state.status) == f"Status({known})"
+
+
 def test_a_message_of_another_form_is_an_event_and_no_end():
     state = State()
     assert state.take("unknown", {"status": {"cycle": -1}}) == ("status", {"cycle": -1})

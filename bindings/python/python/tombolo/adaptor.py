@@ -217,7 +217,7 @@ def _named(given: Optional[Mapping[str, Given]], title: str, expected: str) -> I
 class Adaptor:
     """Links a solver to its viewers and to the orders that change its shape.
 
-    Made before the first step, called in each step, closed behind the last: best by `with`. On several ranks every
+    Made before the first step, called in each step, closed after the last: best by `with`. On several ranks every
     call is collective.
 
     Parameters

@@ -34,7 +34,7 @@ class Event(NamedTuple):
     kind : str
         `hello`, `status`, `order`, `parameters`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`,
         `camera`, `wheel` (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`,
-        `error`, `end`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes behind it),
+        `error`, `end`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes after it),
         or the name of a message that this version does not know, which comes where all kinds are asked for.
     data : dict, View or str
         The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
@@ -116,7 +116,7 @@ class Callbacks:
         with self._lock:
             chosen = [function for kind, function in self._functions if kind in (None, event.kind)]
             if event.kind == "ended":
-                # Nothing comes behind it: a function that is added from now on is told by a thread of its own.
+                # Nothing comes after it: a function that is added from now on is told by a thread of its own.
                 self._functions, self._run, self._thread = [], None, None
         for function in chosen:
             try:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Command", "Forecast", "Order"]
 
-#: How long a status may take to come behind an answer, in seconds.
+#: How long a status may take to come after an answer, in seconds.
 _STATUS = 2.0
 #: Edits or a whole order, as Python's values or as a file.
 Edits = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Any]]]
@@ -56,13 +56,17 @@ class Order:
 
     @property
     def status(self) -> str:
-        """`sent`, then `accepted`, `computing`, `applying`, and in the end `applied` or `rejected`."""
+        """`sent`, then `accepted`, `computing`, `applying`, and in the end `applied` or `rejected`.
+
+        It is `applied` also once another order or an undo has gone on from a shape before the last: the motion has
+        ended early, `reason` says so, and `shape` how far it came.
+        """
         refused = self._refused()
         return "rejected" if refused is not None else str(self.report.get("status", "sent"))
 
     @property
     def reason(self) -> Optional[str]:
-        """Why it was rejected, or what else there is to know."""
+        """Why it was rejected, or what else there is to know, such as ``order c1-9 went on from shape 5.4``."""
         reason: Optional[str] = self.report.get("reason") or self._refused()
         return reason
 
@@ -86,7 +90,11 @@ class Order:
 
     @property
     def fraction(self) -> Optional[float]:
-        """The fraction of its amounts that is done; of one that was rejected what would pass, where that is known."""
+        """The fraction of its amounts that its last shape has, less than 1 where the guard has clamped it.
+
+        Of an order that was rejected it is what would pass, where that is known. It stays as it is where another order
+        or an undo goes on from a shape before the last: `reason` says so.
+        """
         fraction: Optional[float] = self.report.get("fraction")
         return fraction
 
@@ -100,7 +108,10 @@ class Order:
         return str(data["message"]) if kind == "error" else None
 
     def wait(self, timeout: Optional[float] = None, *, until: str = "applied") -> Order:
-        """Wait until the solver has been given its last shape.
+        """Wait until the solver has been given the order's last shape, or another order goes on before that.
+
+        An order or an undo that begins while this one moves the mesh goes on from the shape there is. This one is
+        `applied` then, though its motion has ended early: `reason` says so, and `shape` how far it came.
 
         Parameters
         ----------
@@ -288,7 +299,7 @@ class Command:
         if answer is not None and answer[0] == "error":
             raise RejectedError(answer[1]["message"])
         if self.task in ("pause", "resume"):
-            # The status comes behind the answer. Somebody else may have had it otherwise by then, or the run may be
+            # The status comes after the answer. Somebody else may have had it otherwise by then, or the run may be
             # over: it has taken effect all the same.
             with contextlib.suppress(TomboloError):
                 yield self._is_shown, max(min(until - clock.monotonic(), _STATUS), 0.0), "it was not shown"
