@@ -84,8 +84,8 @@ def _input(name="Input", port=0):
 
 _NAMED = (
     _input()
-    + _text("Features", "The features that are moved, parted by commas.")
-    + _text("Fixed", "The features that are held, parted by commas.")
+    + _text("Features", "The features that are moved, separated by commas.")
+    + _text("Fixed", "The features that are held, separated by commas.")
 )
 _FEATURES = _NAMED + _count(
     "HarmonicOrder", "How smoothly the rest follows: 1 with a kink, 2 with a slope, 3 with a curvature.", 2, 1, 3
@@ -119,15 +119,33 @@ def _displacement(data, name):
 def _vertices(data):
     vertices = vtk.array(data.GetPointData(), "vertices")
     if vertices is None:
-        raise tombolo.MeshError("the input: found no point array 'vertices', expected that of a Tombolo surface")
+        raise tombolo.MeshError(
+            "the input: found no point array 'vertices', expected a Tombolo surface: take Tombolo Surface as the input,"
+            " or a filter behind it that keeps its point arrays"
+        )
     return vertices
+
+
+def _each_once(vertices, values, what):
+    """Vertices rising, each once, and their values; an error where a vertex comes with two values."""
+    if np.all(vertices[1:] > vertices[:-1]):
+        return vertices, values
+    # Filters that split faces have a vertex more than once.
+    once, first, at = np.unique(vertices, return_index=True, return_inverse=True)
+    differs = np.any((values != values[first][at]) & ~np.isnan(values), axis=1)
+    if differs.any():
+        raise tombolo.MeshError(
+            f"the input: found vertex {vertices[np.argmax(differs)]} with two {what}, expected one: an order is of one"
+            " chain. Tombolo Combine Displacements adds two chains"
+        )
+    return once, values[first]
 
 
 def _fingerprint(vertices, moved):
     """A text that tells a displacement of vertices from others, in whatever order and however often each comes."""
-    vertices, first = np.unique(vertices, return_index=True)
+    vertices, moved = _each_once(vertices, moved, "displacements")
     made = hashlib.blake2b(vertices.astype(np.int64), digest_size=16)
-    made.update(np.ascontiguousarray(moved[first]))
+    made.update(np.ascontiguousarray(moved))
     return made.hexdigest()
 
 
@@ -150,9 +168,7 @@ def _edits(data):
 
 def _as_edits(vertices, moved):
     """A displacement as an edit of the vertices that move; none where nothing does."""
-    # Filters that part faces have a vertex more than once.
-    vertices, first = np.unique(vertices, return_index=True)
-    moved = moved[first]
+    vertices, moved = _each_once(vertices, moved, "displacements")
     kept = np.flatnonzero(np.any(moved != 0, axis=1))
     if len(kept) == 0:
         return []
@@ -174,8 +190,17 @@ def _moved(data, surface):
     return vtk.points(data) - surface.points[at] if np.array_equal(surface.vertices[at], vertices) else None
 
 
+def _is_reference(data, surface):
+    """Whether the input is a reference surface that nothing has been done to."""
+    if surface is None or data.GetPointData().HasArray("displacement"):
+        return False
+    text, *_ = vtk.texts(data, "edits") or ["[]"]
+    is_whole = np.array_equal(_vertices(data), surface.vertices)
+    return json.loads(text) == [] and is_whole and np.array_equal(vtk.points(data), surface.points)
+
+
 def _check_points(data, surface, moved):
-    """Points that something else than the displacement has moved show another shape than is ordered."""
+    """Points that something other than the displacement has moved show another shape than is ordered."""
     by = None if surface is None or len(moved) == 0 else _moved(data, surface)
     # An order for another run than that of its input is of edits alone.
     if by is None:
@@ -419,6 +444,7 @@ class _Edit(_Algorithm):
 
     def run(self, output, surface):
         output.ShallowCopy(surface)
+        _each_once(_vertices(surface), vtk.points(surface), "positions")
         edits = [*_edits_or_displacement(surface), self.edit()]
         moved = vtk.shaper(surface).displacement(_of_points(edits, surface))
         vtk.add(output.GetPointData(), "displacement", moved)
@@ -532,10 +558,11 @@ class TomboloCombine(_Algorithm):
 
     def run(self, output, first, second):
         moved = [_displacement(each, "displacement") for each in (first, second)]
-        if moved[0].shape != moved[1].shape:
-            raise tombolo.MeshError(
-                f"the inputs: found {len(moved[0])} and {len(moved[1])} points, expected edits of one surface"
-            )
+        vertices = [_vertices(each) for each in (first, second)]
+        if not np.array_equal(*vertices):
+            counts = [len(each) for each in vertices]
+            found = "points of other vertices" if counts[0] == counts[1] else f"{counts[0]} and {counts[1]} points"
+            raise tombolo.MeshError(f"the inputs: found {found}, expected edits of one surface")
         output.ShallowCopy(first)
         sum_of_both = self.weights[0] * moved[0] + self.weights[1] * moved[1]
         vtk.add(output.GetPointData(), "displacement", sum_of_both)
@@ -568,7 +595,8 @@ class TomboloExport(_Algorithm):
         try:
             if not self.file:
                 raise tombolo.ConfigurationError("FileName: found an empty text, expected the name of a file")
-            rows = zip(_vertices(data).tolist(), _displacement(data, "displacement").tolist())
+            vertices, moved = _each_once(_vertices(data), _displacement(data, "displacement"), "displacements")
+            rows = zip(vertices.tolist(), moved.tolist())
             with open(self.file, "w", encoding="utf-8") as file:
                 file.write("# vertex dx dy dz\n")
                 file.writelines(f"{vertex} {x!r} {y!r} {z!r}\n" for vertex, (x, y, z) in rows if x or y or z)
@@ -618,6 +646,7 @@ class TomboloOrder(_Linked):
         """The edits of the input, or the displacement that it holds."""
         data = self.GetInputDataObject(0, 0)
         surface = connected.surface
+        _each_once(_vertices(data), vtk.points(data), "positions")
         if not self.array:
             if surface is None:
                 raise tombolo.MeshError("the run: found no surface yet, expected that which points were moved from")
@@ -625,6 +654,8 @@ class TomboloOrder(_Linked):
             if moved is None:
                 raise tombolo.MeshError("the input: found other vertices, expected those of the surface of this run")
             return _as_edits(_vertices(data), moved)
+        if self.array == "displacement" and _is_reference(data, surface):
+            return []
         moved = _displacement(data, self.array)
         _check_points(data, surface, moved)
         edits = _edits(data)

@@ -116,7 +116,7 @@ def test_fields_are_borrowed_by_their_length():
         lambda a: np.frombuffer(b"\0" + a.tobytes(), a.dtype, offset=1).reshape(a.shape),
         lambda a: a.tolist(),
         lambda a: np.repeat(a, 2, axis=0)[::2],
-        lambda a: np.asfortranarray(a),
+        np.asfortranarray,
         lambda a: a[:, ::-1].copy()[:, ::-1] if a.ndim > 1 else a,
     ],
 )

@@ -374,6 +374,105 @@ def test_what_filters_of_vtk_make_of_a_chain_is_what_is_ordered(plugin, solver):
     assert plugin.errors == []
 
 
+def test_an_input_with_two_displacements_of_a_vertex_is_refused_in_plain_vtk(plugin, solver, tmp_path):
+    from tombolo import vtk
+    from vtkmodules.vtkFiltersCore import vtkAppendPolyData, vtkPolyDataNormals
+    from vtkmodules.vtkFiltersGeneral import vtkWarpVector
+
+    surface = plugin.make("TomboloSurface", Link=solver.link)
+    newest(surface)
+    connected = tombolo.background.connection(solver.link)
+    ends = {"Features": "top", "Fixed": "bottom"}
+    first = plugin.make("TomboloTranslate", surface, By=[0, 0, -0.2], **ends)
+    second = plugin.make("TomboloTranslate", surface, By=[0.1, 0, 0], **ends)
+
+    def appended(*chains):
+        made = vtkAppendPolyData()
+        for chain in chains:
+            made.AddInputConnection(chain.GetOutputPort())
+        return made
+
+    both = appended(first, second)
+    order = plugin.make("TomboloOrder", both)
+    order.Update()
+    with pytest.raises(tombolo.MeshError, match=r"vertex \d+ with two displacements.* Tombolo Combine Displacements"):
+        order.edits(connected)
+    plugin.make("TomboloTranslate", both, By=[0, 0, 0.1], **ends).Update()
+    plugin.make("TomboloExport", both, FileName=str(tmp_path / "both.txt")).Write()
+    assert ["with two displacements" in error for error in plugin.errors] == [True, True]
+    assert not (tmp_path / "both.txt").exists()
+    plugin.errors.clear()
+    # The same displacement, but shown here and there.
+    warp = vtkWarpVector()
+    warp.SetInputConnection(first.GetOutputPort())
+    warp.SetInputArrayToProcess(0, 0, 0, 0, "displacement")
+    here_and_there = appended(first, warp)
+    order.SetInputConnection(here_and_there.GetOutputPort())
+    order.Update()
+    for array in ("displacement", None):
+        order.SetArray(array)
+        with pytest.raises(tombolo.MeshError, match=r"vertex \d+ with two positions"):
+            order.edits(connected)
+    # A filter that splits faces has a vertex more than once, each time with one displacement.
+    normals = vtkPolyDataNormals()
+    normals.SetFeatureAngle(30)
+    normals.SetInputConnection(first.GetOutputPort())
+    normals.Update()
+    assert normals.GetOutput().GetNumberOfPoints() > shown(surface).GetNumberOfPoints()
+    order.SetInputConnection(normals.GetOutputPort())
+    order.SetArray("displacement")
+    order.Update()
+    assert [next(iter(edit)) for edit in order.edits(connected)] == ["translate"]
+    # As many points, of other vertices.
+    other = shown(second).NewInstance()
+    other.ShallowCopy(shown(second))
+    vtk.add(other.GetPointData(), "vertices", vtk.array(other.GetPointData(), "vertices") + 1)
+    combined = plugin.make("TomboloCombine", first, second)
+    assert shown(combined).GetNumberOfPoints() > 0
+    combined.SetInputDataObject(1, other)
+    assert shown(combined).GetNumberOfPoints() == 0
+    assert "found points of other vertices, expected edits of one surface" in plugin.errors.pop()
+    assert plugin.errors == []
+
+
+def test_a_surface_without_any_edit_orders_the_reference_shape_in_plain_vtk(plugin, solver):
+    from vtkmodules.vtkCommonTransforms import vtkTransform
+    from vtkmodules.vtkFiltersGeneral import vtkTransformFilter
+
+    surface = plugin.make("TomboloSurface", Link=solver.link)
+    newest(surface)
+    connected = tombolo.background.connection(solver.link)
+    run, begin = connected.run, solver.points.copy()
+    run.order([{"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, 0.1]}}]).wait(60)
+    wait(lambda: solver.points[:, 2].max() == pytest.approx(1.1))
+    order = plugin.make("TomboloOrder", surface, Link=solver.link, Steps=2, Every=1)
+    order.Give()
+    assert plugin.errors == []
+    wait(lambda: len(run.orders) == 2)
+    run.orders[-1].wait(60)
+    assert run.stack == []
+    wait(lambda: np.array_equal(solver.points, begin))
+    # Points that were moved are no reference shape.
+    moved = vtkTransformFilter()
+    moved.SetTransform(vtkTransform())
+    moved.GetTransform().Scale(1, 1, 0.7)
+    moved.SetInputConnection(surface.GetOutputPort())
+    order.SetInputConnection(moved.GetOutputPort())
+    order.Give()
+    assert "found no point array 'displacement'" in plugin.errors.pop()
+    assert len(run.orders) == 2
+
+
+def test_an_edit_of_what_is_no_tombolo_surface_says_what_to_do_in_plain_vtk(plugin, solver):
+    source = plugin.make("TomboloRun", Link=solver.link)
+    assert newest(source).GetNumberOfPoints() > 0
+    for name in ("TomboloTranslate", "TomboloDragSkeleton"):
+        made = plugin.make(name, source, Features="top", Fixed="bottom")
+        assert shown(made).GetNumberOfPoints() == 0
+        assert "expected a Tombolo surface: take Tombolo Surface as the input" in plugin.errors.pop()
+    assert plugin.errors == []
+
+
 def test_a_connection_ends_with_the_last_source_in_plain_vtk(plugin, solver, connections):
     source = plugin.make("TomboloSurface", Link=solver.link)
     newest(source)

@@ -351,7 +351,7 @@ def test_a_link_file_that_is_not_there_is_named_with_its_folder(tmp_path, monkey
     for given, named in (("run.link", tmp_path / "run.link"), ("~/run.link", tmp_path / "home/run.link")):
         with pytest.raises(tombolo.LinkError, match=rf"no file '{named}'"):
             tombolo.connect(given)
-    with pytest.raises(TypeError, match="link: found b'run.link'"):
+    with pytest.raises(TypeError, match=r"link: found b'run\.link'"):
         tombolo.connect(b"run.link")
 
 

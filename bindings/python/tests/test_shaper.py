@@ -211,14 +211,14 @@ def test_what_is_no_mesh_is_told():
 
 
 def test_long_work_tells_what_it_is_at():
-    points, tets = box(20)
+    points, tets = box(36)
     told = []
     faces = ends(points, tets)
     shaper = tombolo.Shaper(points, {"tetra": tets}, faces, progress=lambda *now: told.append(now))
     assert told and {stage for stage, _ in told} == {"mesh"}
-    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 60}}]
+    turn = [{"rotate": {"features": ["top"], "fixed": ["bottom"], "axis": [0, 0, 1], "degrees": 30}}]
     told.clear()
-    shape = shaper.shape(turn, progress=lambda *now: told.append(now), guard={"min_scaled_jacobian": 0.1})
+    shape = shaper.shape(turn, progress=lambda *now: told.append(now))
     stages, seconds = zip(*told)
     assert stages[0] == "surface" and {"volume"} <= set(stages) <= {"surface", "volume", "guard"}
     assert list(seconds) == sorted(seconds) and sum(shape.details["seconds"].values()) > 0.1 * (len(told) - 2)
@@ -399,3 +399,116 @@ def test_cells_of_meshio_that_are_not_linear_are_told():
     mesh = meshio.Mesh(beside, [("tetra10", numbers)])
     shaper = tombolo.Shaper(mesh.points, {"tetra": mesh.cells_dict["tetra10"][:, :4]}, ends(points, tets))
     assert shaper.shape(SQUEEZE).quality["inverted"] == 0
+
+
+def prism(corners):
+    """A prism on a regular polygon: points and cells."""
+    angles = 2 * np.pi * np.arange(corners) / corners
+    points = [[np.cos(angle), np.sin(angle), height] for height in (0.0, 1.0) for angle in angles]
+    return np.array(points), {{5: "pentagonal prism", 6: "hexagonal prism"}[corners]: np.arange(2 * corners)[None]}
+
+
+@pytest.mark.parametrize("corners", [5, 6])
+def test_the_surface_of_a_prism_is_taken_back_from_meshio(corners):
+    points, cells = prism(corners)
+    sides = [[at, (at + 1) % corners, (at + 1) % corners + corners, at + corners] for at in range(corners)]
+    shaper = tombolo.Shaper(points, cells, {"sides": sides})
+    again = shaper.surface.to_meshio()
+    assert {block.type for block in again.cells} == {"quad", "polygon"}
+    assert features_of(again) == [(it["name"], it["faces"], it["vertices"]) for it in shaper.features]
+    edits = [{"scale_direction": {"features": ["untagged"], "factors": [2, 1, 1]}}]
+    assert np.array_equal(tombolo.Shaper(again).displacement(edits), shaper.displacement(edits))
+
+
+def test_polygons_of_meshio_are_those_of_the_program(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    tube = pyvista.Cylinder(resolution=7).cast_to_unstructured_grid()
+    for numbers in (None, [0] * 7 + [1, 2]):
+        if numbers is not None:
+            tube.cell_data["features"] = np.array(numbers)
+        tube.save(tmp_path / "tube.vtu")
+        mesh = meshio.read(tmp_path / "tube.vtu")
+        assert "polygon" in {block.type for block in mesh.cells}
+        assert features_of(mesh) == features_of_program(tmp_path / "tube.vtu")
+    # Of several sizes, triangles and quadrangles among them, in named sets.
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [3, 1, 0], [2, 2, 0], [0, 2, 0]], float)
+    rows = [[0, 1, 2, 3]], [[1, 4, 5, 6, 2]], [[3, 2, 7]]
+    sets = {"square": [[0], [], []], "rest": [None, np.array([0]), [0]]}
+    mesh = meshio.Mesh(points, [("polygon", np.array(it)) for it in rows], cell_sets=sets)
+    assert features_of(mesh) == [("square", 1, 4), ("rest", 2, 7)]
+    assert len(tombolo.Shaper(mesh).scaled_jacobians()) == 3
+    # Beside volume cells they are of the boundary.
+    points, _ = prism(5)
+    tets = [[0, 1, 2, 5], [0, 2, 3, 5]]
+    mesh = meshio.Mesh(points, [("tetra", np.array(tets)), ("polygon", np.arange(5)[None])])
+    assert len(tombolo.Shaper(mesh).scaled_jacobians()) == 2
+    curved = meshio.Mesh(points, [("polygon", np.arange(5)[None]), ("VTK_LAGRANGE_TRIANGLE", np.arange(6)[None])])
+    with pytest.raises(tombolo.MeshError, match="found cells of type 'VTK_LAGRANGE_TRIANGLE'"):
+        tombolo.Shaper(curved)
+    with pytest.raises(tombolo.MeshError, match=r"found polygons of shape \(0,\), expected a row for each"):
+        tombolo.Shaper(meshio.Mesh(points, [("polygon", np.array([]))]))
+
+
+def test_features_of_meshio_that_make_no_sense_are_told():
+    blocks = [("tetra", TETS), ("triangle", FACES["top"])]
+    texts = {"features": [np.full(len(rows), "wall") for _, rows in blocks]}
+    with pytest.raises(tombolo.MeshError, match="'features': found other values, expected a whole number"):
+        tombolo.Shaper(meshio.Mesh(POINTS, blocks, cell_data=texts))
+    for wrong, found in (
+        ([0, 99], "cell 99"),
+        ([-1], "cell -1"),
+        (["a"], "an array of <U1"),
+        ([True], "an array of bool"),
+    ):
+        mesh = meshio.Mesh(POINTS, blocks, cell_sets={"lid": [[], np.array(wrong)]})
+        with pytest.raises(tombolo.MeshError, match=f"the set of cells 'lid': found {found}.* expected the numbers"):
+            tombolo.Shaper(mesh)
+
+
+@pytest.mark.parametrize("angle", ["30", 181, -1.0, float("nan"), [30], True])
+def test_what_is_no_angle_is_told(angle):
+    with pytest.raises(tombolo.MeshError, match=r"angle: found .*, expected degrees from 0 to 180"):
+        tombolo.Shaper(POINTS, {"tetra": TETS}, angle=angle)
+
+
+def test_a_feature_whose_faces_are_all_in_others_is_told():
+    top, bottom = FACES["top"], FACES["bottom"]
+    for faces, text in (
+        ({"wall": np.concatenate([top, bottom]), "top": top}, "the feature 'top': found all of its faces in 'wall'"),
+        (
+            {"top": top, "bottom": bottom, "all": {"triangle": np.concatenate([bottom, top[:, ::-1]])}},
+            "'top' and 'bottom'",
+        ),
+    ):
+        mesh = tombolo.Mesh(POINTS, {"tetra": TETS}, faces=faces)
+        for given in ((POINTS, {"tetra": TETS}, faces), (mesh,), ({"solid": mesh},)):
+            with pytest.raises(tombolo.MeshError, match=text):
+                tombolo.Shaper(*given)
+        assert len(tombolo.Shaper(mesh, angle=30).features) == 6
+    # A face of its own is enough, and faces inside are of no feature of the surface.
+    some = {"wall": top[1:], "top": top}
+    inside = np.sort(TETS[:, [[0, 1, 3], [1, 2, 3], [2, 0, 3], [0, 2, 1]]].reshape(-1, 3), axis=1)
+    rows, counts = np.unique(inside, axis=0, return_counts=True)
+    shaper = shaper_of(faces={**some, "inside": rows[counts == 2]})
+    assert [(it["name"], it["faces"]) for it in shaper.features[:2]] == [("wall", len(top) - 1), ("top", 1)]
+
+
+def test_volume_cells_have_three_coordinates():
+    for points in (POINTS[:, :2], (POINTS[:, 0].copy(), POINTS[:, 1].copy())):
+        for cells, kind in (({"tetra": TETS}, "'tetra'"), ({10: TETS}, "10")):
+            with pytest.raises(tombolo.MeshError, match=f"found two coordinates, expected three: cells of type {kind}"):
+                tombolo.Shaper(points, cells)
+    of_vtk = {"connectivity": TETS.ravel(), "offsets": 4 * np.arange(len(TETS) + 1), "types": np.full(len(TETS), 10)}
+    with pytest.raises(tombolo.MeshError, match="found two coordinates"):
+        tombolo.Shaper(POINTS[:, :2], of_vtk)
+
+
+def test_truth_values_number_no_vertices():
+    truth = FACES["top"] > 0
+    for given, what in (
+        ((POINTS, {"tetra": TETS > 0}), r"cells\['tetra'\]"),
+        ((POINTS, {"tetra": TETS}, {"top": truth}), r"faces\['top'\]"),
+        ((POINTS, {"tetra": TETS}, {"top": {"triangle": truth}}), r"faces\['top'\]\['triangle'\]"),
+    ):
+        with pytest.raises(tombolo.MeshError, match=f"{what}: found an array of bool, expected vertex numbers"):
+            tombolo.Shaper(*given)

@@ -153,6 +153,9 @@ def test_polygons_of_every_size_have_features():
 def test_what_is_no_mesh_is_told():
     with pytest.raises(tombolo.MeshError, match="no cells"):
         vtk.to_mesh(vtkPolyData())
+    for wrong, found in ((None, "a NoneType"), (vtkMultiBlockDataSet(), "a vtkMultiBlockDataSet of no block")):
+        with pytest.raises(tombolo.MeshError, match=f"found {found}.*, expected a vtkDataSet"):
+            vtk.to_mesh(wrong)
     made = grid()
     for wrong in (np.array([0.5, 1, 1, 1]), np.ones((4, 2))):
         vtk.add(made.GetCellData(), "features", wrong)

@@ -16,16 +16,44 @@ from conftest import PROJECT, TARGET
 PAGE = PROJECT / "docs/python.md"
 
 
+def sources(project):
+    """The files of the package in a checkout that a wheel is built from: in Python, in Rust, and how it is built."""
+    package = project / "bindings/python"
+    of_python = [package / "pyproject.toml", *package.glob("backend/*.py"), *package.glob("python/tombolo/*.py*")]
+    crates = [package, *(project / name for name in ("adaptor", "deform", "pipelines"))]
+    of_rust = [found for crate in crates for found in (crate / "Cargo.toml", *crate.glob("src/**/*.rs"))]
+    return [file for file in (*of_python, *of_rust, project / "Cargo.lock") if file.is_file()]
+
+
+def newest_wheel(project, folder):
+    """The newest wheel in a folder; None where a file that it would be built from is newer."""
+    built = max(folder.glob("tombolo-*.whl"), key=lambda file: file.stat().st_mtime, default=None)
+    changed = max(file.stat().st_mtime for file in sources(project))
+    return built if built is not None and built.stat().st_mtime >= changed else None
+
+
 @pytest.fixture
 def wheel():
     """The wheel that TOMBOLO_WHEEL names, or the newest of `pip wheel -w target/wheels ./bindings/python`."""
     named = os.environ.get("TOMBOLO_WHEEL")
-    built = sorted(TARGET.glob("wheels/tombolo-*.whl"), key=lambda file: file.stat().st_mtime)
     # One that is older than what it is built from says nothing of it.
-    settings = (PROJECT / "bindings/python/pyproject.toml").stat().st_mtime
-    if named is None and not (built and built[-1].stat().st_mtime >= settings):
+    found = newest_wheel(PROJECT, TARGET / "wheels") if named is None else Path(named)
+    if found is None:
         pytest.skip("there is no new wheel: pip wheel --no-deps -w target/wheels ./bindings/python")
-    return Path(named) if named is not None else built[-1]
+    return found
+
+
+@pytest.mark.parametrize("file", ["bindings/python/python/tombolo/shaper.py", "deform/src/mesh/cells.rs"])
+def test_a_wheel_is_as_new_as_each_file_that_it_is_built_from(file, tmp_path):
+    assert PROJECT / file in sources(PROJECT)
+    source, old, new = (tmp_path / name for name in (file, "tombolo-1.whl", "tombolo-2.whl"))
+    source.parent.mkdir(parents=True)
+    for seconds, made in enumerate((old, source)):
+        made.touch()
+        os.utime(made, (seconds, seconds))
+    assert newest_wheel(tmp_path, tmp_path) is None
+    new.touch()
+    assert newest_wheel(tmp_path, tmp_path) == new
 
 
 def test_a_wheel_needs_python_alone(wheel, tmp_path):

@@ -9,7 +9,7 @@ import threading
 import time as clock
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Generator, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Optional, SupportsIndex, TypeVar, Union
+from typing import TYPE_CHECKING, Any, Optional, SupportsFloat, SupportsIndex, TypeVar, Union
 
 from . import _json
 from ._reader import NOT_FOUND, Reader, late
@@ -465,7 +465,7 @@ class AsyncRun:
         command = Command(self.run, await self._send(send, timeout), task)
         return await self._carry_out(command._wait(left(begin, timeout), timeout))
 
-    async def set(self, parameter: str, value: float, *, timeout: Optional[float] = None) -> Command:
+    async def set(self, parameter: str, value: SupportsFloat, *, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it.
 
         Parameters

@@ -12,10 +12,11 @@ from .errors import MeshError
 
 __all__ = ["Cells", "Field", "Mesh", "Values"]
 
-Cells = Mapping[Union[str, int], ArrayLike]
+# Keys are texts or numbers. Of a Mapping they are invariant: a dict[str, ...] is no Mapping[Union[str, int], ...].
+Cells = Mapping[Any, ArrayLike]
 """Cells: from types to vertex numbers, a row for each cell; or `connectivity`, `offsets` and `types` of VTK."""
 
-Faces = Mapping[str, Union[ArrayLike, Mapping[Union[str, int], ArrayLike]]]
+Faces = Mapping[str, Union[ArrayLike, Cells]]
 """Named parts of the boundary: from names to faces `(m, 3)` or `(m, 4)`, or to a dict from types to such arrays."""
 
 Values = Union[ArrayLike, Sequence[NDArray[Any]], "Field"]
@@ -69,7 +70,8 @@ class Mesh:
         most 9 components; a `Field` where it has to be said which.
     faces : dict, optional
         Named parts of the boundary, which edits can move or hold: from names to faces by their vertices, `(m, 3)` or
-        `(m, 4)`, or a dict from types to such arrays. Left out: parts are found between sharp edges.
+        `(m, 4)`, or a dict from types to such arrays. A face in several of them is of the first. Left out: parts are
+        found between sharp edges.
     vertex_features : array of shape (n,), optional
         In place of `faces`: of each vertex the number of its part.
     ghost_cells : array of shape (m,), optional
@@ -138,6 +140,22 @@ class Mesh:
         return f"<tombolo.Mesh with the fields: {fields}>"
 
 
+def fan(corners: int) -> list[list[int]]:
+    """Cut a polygon into triangles.
+
+    Parameters
+    ----------
+    corners : int
+        How many it has.
+
+    Returns
+    -------
+    list of [int, int, int]
+        Which of its corners each triangle has.
+    """
+    return [[0, at, at + 1] for at in range(1, corners - 1)]
+
+
 def faces_of_features(
     parts: Iterable[tuple[Union[str, int], NDArray[Any], NDArray[Any]]], names: Mapping[int, str]
 ) -> Optional[Faces]:
@@ -158,11 +176,12 @@ def faces_of_features(
     Raises
     ------
     MeshError
-        The number of a feature is not whole.
+        The number of a feature is no whole number.
     """
     found: dict[int, dict[Union[str, int], list[NDArray[Any]]]] = {}
     for kind, rows, numbers in parts:
-        if numbers.ndim != 1 or not np.array_equal(numbers, np.trunc(numbers)):
+        is_of_numbers = numbers.ndim == 1 and numbers.dtype.kind in "biuf"
+        if not is_of_numbers or not np.array_equal(numbers, np.trunc(numbers)):
             raise MeshError("the cell array 'features': found other values, expected a whole number for each cell")
         for number in np.unique(numbers[numbers >= 0]):
             found.setdefault(int(number), {}).setdefault(kind, []).append(rows[numbers == number])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Optional, SupportsIndex, Union
+from typing import TYPE_CHECKING, Any, Optional, SupportsFloat, SupportsIndex, Union
 
 from . import _json
 from ._values import number, seconds, whole
@@ -335,7 +335,7 @@ class Run(Watched):
         identity = id_of(order, "order")
         return self._give(lambda: self._reader.client.cancel(identity), "cancel", wait, timeout)
 
-    def set(self, parameter: str, value: float, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+    def set(self, parameter: str, value: SupportsFloat, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, within its bounds.
 
         Parameters

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import functools
-import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar, Union
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
 from ._identity import by_identity
+from ._mesh_checks import check_faces, check_found, check_numbers, check_room, degrees, part, what_it_is
+from ._meshio import of_meshio
 from ._waiting import in_thread
 from .errors import MeshError
-from .mesh import Cells, Faces, Mesh, faces_of_features
+from .mesh import Cells, Faces, Mesh
 from .orders import Forecast
 from .views import Surface
 
@@ -82,82 +83,6 @@ class Skeleton(NamedTuple):
         return f"<tombolo.Skeleton: {len(self.nodes)} nodes on {len(self.curves)} curves>"
 
 
-#: The dimension of each of meshio's types that may stand beside the cells of a mesh.
-_DIMENSIONS = {
-    **{"vertex": 0, "line": 1, "triangle": 2, "quad": 2},
-    **{"tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3},
-}
-
-
-#: The vertices of a cell of each of meshio's linear types.
-_CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
-
-
-def _check_linear(kind: str) -> None:
-    """An error for meshio's cells with vertices on their edges, and for its polyhedra."""
-    linear = kind.rstrip("0123456789")
-    if linear == "polyhedron":
-        raise MeshError("meshio's mesh: found polyhedra, expected cells of a type such as 'tetra' or 'hexahedron'")
-    if linear != kind and linear in _CORNERS:
-        corners = f"mesh.cells_dict['{kind}'][:, :{_CORNERS[linear]}]"
-        raise MeshError(
-            f"meshio's mesh: found cells of type '{kind}', expected linear cells: their corners alone are "
-            f"{{'{linear}': {corners}}}, beside mesh.points"
-        )
-
-
-def _of_meshio(mesh: Any) -> Mesh:
-    # What meshio calls the numbers of Gmsh's groups, and what the program calls those of features in a file of VTK.
-    key = next((key for key in ("gmsh:physical", "features") if key in mesh.cell_data), None)
-    groups = mesh.cell_data[key] if key else [np.full(len(block.data), -1) for block in mesh.cells]
-    blocks: dict[str, list[tuple[NDArray[Any], NDArray[Any]]]] = {}
-    for block, numbers in zip(mesh.cells, groups):
-        blocks.setdefault(block.type, []).append((block.data, numbers))
-    parts: dict[str, tuple[NDArray[Any], NDArray[Any]]] = {}
-    for kind, of_kind in blocks.items():
-        rows, numbers = (np.concatenate(arrays) for arrays in zip(*of_kind))
-        if key == "gmsh:physical":
-            # Version 2.2 has a cell of several groups once for each: the first holds.
-            first = np.sort(np.unique(rows, axis=0, return_index=True)[1])
-            # 0 is that of no group; one below 0 says that a surface is turned round in its group.
-            rows, numbers = rows[first], np.where(numbers == 0, -1, np.abs(numbers))[first]
-        parts[kind] = rows, numbers
-    for kind in parts:
-        _check_linear(kind)
-    # Faces and edges beside volume cells are of the boundary. A type that is not known is kept, and refused by name.
-    most = max((_DIMENSIONS.get(kind, 0) for kind in parts), default=0)
-    cells: dict[Union[str, int], ArrayLike] = {
-        kind: rows for kind, (rows, _) in parts.items() if _DIMENSIONS.get(kind, most) == most
-    }
-    pairs = {name: np.ravel(pair) for name, pair in mesh.field_data.items()}
-    names = {int(pair[0]): name for name, pair in pairs.items() if len(pair) == 2 and pair[1] == 2}
-    faces = faces_of_features(
-        ((kind, rows, numbers) for kind, (rows, numbers) in parts.items() if _DIMENSIONS.get(kind) == 2), names
-    )
-    faces = _sets_of_meshio(mesh) if faces is None else faces
-    return Mesh(
-        mesh.points,
-        cells,
-        faces=faces,
-        vertex_features=mesh.point_data.get("features") if faces is None else None,
-    )
-
-
-def _sets_of_meshio(mesh: Any) -> Optional[Faces]:
-    """The faces in each of meshio's named sets of cells."""
-    named: dict[str, dict[Union[str, int], ArrayLike]] = {}
-    for name, chosen in mesh.cell_sets.items():
-        # Sets such as `gmsh:bounding_entities` are meshio's own, and no sets of cells.
-        parts = [] if name.startswith("gmsh:") else zip(mesh.cells, chosen)
-        of_kind: dict[Union[str, int], list[NDArray[Any]]] = {}
-        for block, rows in parts:
-            if rows is not None and len(rows) and _DIMENSIONS.get(block.type) == 2:
-                of_kind.setdefault(block.type, []).append(block.data[np.asarray(rows, np.int64)])
-        if of_kind:
-            named[name] = {kind: np.concatenate(rows) for kind, rows in of_kind.items()}
-    return named or None
-
-
 def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
     if "replaces" in settings:
         raise TypeError("replaces: without a run there is no order that could be replaced")
@@ -165,38 +90,6 @@ def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
 
 
 _EXPECTED = "a tombolo.Mesh, a mesh of meshio or PyVista, a vtkDataSet, or coordinates with their cells"
-
-
-def _check_faces(faces: Optional[Faces]) -> None:
-    """An error where a feature has no faces, by its name."""
-    for name, given in faces.items() if isinstance(faces, Mapping) else ():
-        parts: Iterable[Any] = given.values() if isinstance(given, Mapping) else [given]
-        if all(hasattr(part, "__len__") and len(part) == 0 for part in parts):
-            raise MeshError(f"the feature '{name}' has no faces, expected at least one")
-
-
-def _blocks(given: Any) -> str:
-    """The blocks of one of VTK's data objects of several, by their names."""
-    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
-
-    names = []
-    for number in range(given.GetNumberOfBlocks()):
-        about = given.GetMetaData(number) if given.HasMetaData(number) else None
-        name = None if about is None else about.Get(vtkCompositeDataSet.NAME())
-        names.append(f"block {number}" if name is None else f"'{name}'")
-    return ", ".join(names) or "no block"
-
-
-def _what_it_is(given: Any) -> str:
-    """What was given in place of a mesh, and what would have made one of it."""
-    if hasattr(given, "GetNumberOfBlocks"):
-        joined = ", or all together: mesh.combine()" if hasattr(given, "combine") else ""
-        return f"a {type(given).__name__} of {_blocks(given)} (take one of them{joined})"
-    if isinstance(given, (str, os.PathLike)):
-        return f"the name of a file, '{os.fspath(given)}' (read it first: tombolo.Shaper(meshio.read(...)))"
-    if isinstance(given, (np.ndarray, Sequence)):
-        return "coordinates without cells (tombolo.Shaper(points, cells))"
-    return f"a {type(given).__name__}"
 
 
 def _with_stage(progress: Optional[Progress], stage: Callable[[], str]) -> Optional[Callable[[float], object]]:
@@ -232,7 +125,8 @@ class Shaper:
     Raises
     ------
     MeshError
-        It is no mesh whose shape could be changed: the text says why, and where.
+        It is no mesh whose shape could be changed, such as one with a feature whose faces are all in others before it,
+        or the angle is not from 0 to 180 degrees: the text says why, and where.
 
     Examples
     --------
@@ -266,19 +160,27 @@ class Shaper:
             raise MeshError("faces: found them without cells, expected both or neither: a mesh has its own parts")
         elif not isinstance(mesh, (Mesh, Mapping)):
             # PyVista's meshes have `cells_dict` too, which would be made of all their cells.
-            if hasattr(mesh, "point_sets") and hasattr(mesh, "cells_dict"):
-                mesh = _of_meshio(mesh)
+            # The type is asked: meshio itself would join its blocks, and fail for polygons of several sizes.
+            if hasattr(mesh, "point_sets") and hasattr(type(mesh), "cells_dict"):
+                mesh = of_meshio(mesh)
             elif hasattr(mesh, "GetCellData"):
                 from . import vtk
 
                 mesh = vtk.to_mesh(mesh)
             else:
-                raise MeshError(f"found {_what_it_is(mesh)}, expected {_EXPECTED}")
+                raise MeshError(f"found {what_it_is(mesh)}, expected {_EXPECTED}")
         elif isinstance(mesh, Mapping) and "points" not in mesh and len(mesh) != 1:
             raise MeshError(f"found {len(mesh)} meshes ({', '.join(map(str, mesh))}), expected one")
-        _check_faces(mesh.faces if isinstance(mesh, Mesh) else mesh.get("faces"))
-        make = functools.partial(_native.Shaper, mesh, angle)
+        cells, faces = part(mesh, "cells"), part(mesh, "faces")
+        check_faces(faces)
+        check_numbers("cells", cells)
+        check_numbers("faces", faces)
+        make = functools.partial(_native.Shaper, mesh, degrees(angle))
         self._shaper = in_thread(make, _with_stage(progress, lambda: "mesh"))
+        # What could not be read was refused by then.
+        check_room(part(mesh, "points"), cells)
+        if angle is None:
+            check_found(faces, {feature["name"] for feature in self.features})
 
     # ---- What the mesh is.
 

@@ -16,8 +16,9 @@ from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray, vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkAppendFilter
 
+from ._mesh_checks import what_it_is
 from .errors import MeshError
-from .mesh import Mesh, faces_of_features
+from .mesh import Mesh, faces_of_features, fan
 from .shaper import Shaper, Skeleton
 from .views import Surface, View
 
@@ -261,9 +262,11 @@ def to_mesh(data: Any) -> Mesh:
     Raises
     ------
     MeshError
-        It has no cells, or cells that make no mesh, such as polyhedra and cells with vertices on their edges; or the
-        number of a feature is not whole.
+        It is no vtkDataSet. It has no cells, or cells that make no mesh, such as polyhedra and cells with vertices on
+        their edges. Or the number of a feature is not whole.
     """
+    if not (hasattr(data, "IsA") and data.IsA("vtkDataSet")):
+        raise MeshError(f"found {what_it_is(data)}, expected a vtkDataSet")
     grid = data
     if not data.IsA("vtkUnstructuredGrid"):
         gathered = vtkAppendFilter()
@@ -317,7 +320,7 @@ def _faces(
             # Every other one is turned round.
             corners = [[at, at + 1, at + 2] if at % 2 == 0 else [at + 1, at, at + 2] for at in range(size - 2)]
         elif size != 4:
-            corners = [[0, at, at + 1] for at in range(1, size - 1)]
+            corners = fan(size)
         else:
             # The vertices of a pixel count along its axes, and not around it.
             corners = [[0, 1, 3, 2] if kind == _PIXEL else [0, 1, 2, 3]]
@@ -345,8 +348,8 @@ def _feature_names(data: Any) -> dict[int, str]:
 def shaper(data: Any, *, angle: Optional[float] = None) -> Shaper:
     """Make the shaper of a data object, or find the one that was made of the same data.
 
-    Programs on top of VTK ask again and again for the same mesh, whose operators are dear to set up. The last four are
-    kept.
+    Programs on top of VTK ask again and again for the same mesh, whose operators are expensive to set up. The last
+    four are kept.
 
     Parameters
     ----------
