@@ -115,7 +115,9 @@ fn what_viewers_ask_for_happens_at_the_same_cycle() {
                         is_told = true;
                         if viewer.look_for("forecast", short, |told| told["id"] == "what").is_none()
                         {
-                            viewer.wait_for("error", |error| error["id"] == "what");
+                            let error = viewer.wait_for("error", |error| error["id"] == "what");
+                            let message = error["message"].as_str();
+                            assert!(message.is_some_and(|it| it.contains("a later forecast")));
                         }
                         assert_eq!(told["order"]["outcome"], "rejected", "{told}");
                         viewer.send(&json!({"pause": {}}));

@@ -280,13 +280,13 @@ fn a_forecast_is_told_while_the_solver_is_busy_and_changes_nothing() {
     viewer.send(&json!({"id": "f4", "forecast": {"edits": []}}));
     assert!(viewer.wait_for("error", |error| error["id"] == "f4")["message"].as_str().is_some());
     // None is left without an answer, also where a later one takes its place.
-    let ids: Vec<String> = (0..12).map(|number| format!("many-{number}")).collect();
+    let ids: Vec<String> = (0..30).map(|number| format!("many-{number}")).collect();
     for (id, number) in ids.iter().zip(1..) {
         viewer.send(&json!({"id": id, "forecast": squeeze(0.01 * f64::from(number))}));
     }
-    viewer.wait_for("forecast", |forecast| forecast["id"] == ids[11].as_str());
+    viewer.wait_for("forecast", |forecast| forecast["id"] == ids[29].as_str());
     let mut overtaken = 0;
-    for id in &ids[..11] {
+    for id in &ids[..29] {
         let short = Duration::from_millis(1);
         if viewer.look_for("forecast", short, |forecast| forecast["id"] == id.as_str()).is_none() {
             let error = viewer.wait_for("error", |error| error["id"] == id.as_str());

@@ -696,7 +696,8 @@ class TomboloOrder(_Linked):
     def _table(self):
         rows, connected = self._requests.outcomes, self.connected()
         if connected is not None and connected.run is not None:
-            rows["stack"] = f"{connected.run.edit_count} edits"
+            count = connected.run.edit_count
+            rows["stack"] = f"{count} edit{'' if count == 1 else 's'}"
         return rows
 
     def GetNeedsUpdate(self):

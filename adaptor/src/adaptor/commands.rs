@@ -7,7 +7,7 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use tombolo_deform::communicator::Reduction;
+use tombolo_deform::{communicator::Reduction, shape::Forecast};
 use tombolo_pipelines::{
     extract::Channel,
     files::{UnreadFile, read_displacements},
@@ -18,7 +18,9 @@ use super::{Adaptor, SteeredMesh, absence::Absence};
 use crate::{
     changes::{Changes, make_absolute},
     meeting,
-    steering::{Asked, Forecaster, Log, Queue, Received, Reservation, Source, taken_back},
+    steering::{
+        Asked, Forecaster, Log, OVERTAKEN, Queue, Received, Reservation, Source, taken_back,
+    },
     step::Moment,
     stream::{CommandSink, Hub},
 };
@@ -209,17 +211,14 @@ impl Adaptor {
             .map(|asked| (String::new(), Command::Order((*asked.order).clone())))
             .collect();
         for (index, (_, command)) in self.agreed_with_all(asked).into_iter().enumerate() {
-            let (Command::Order(order), SteeredMesh::Steered(steerer, _)) = (command, &self.mesh)
-            else {
-                continue;
+            let forecast = match (command, &self.mesh) {
+                (Command::Order(order), SteeredMesh::Steered(steerer, _)) => {
+                    Ok(steerer.forecast(&order))
+                }
+                _ => Err(NO_MESH),
             };
-            let forecast = steerer.forecast(&order);
             if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(index), &self.hub) {
-                let id = id.clone();
-                hub.tell_client(
-                    *client,
-                    move || json!({"forecast": {"id": id, "order": forecast}}),
-                );
+                tell_forecast(hub, *client, id.clone(), forecast);
             }
         }
     }
@@ -407,28 +406,33 @@ impl Intake {
         check_files(&command)?;
         let Command::Order(order) = command else { return Ok(()) };
         if self.is_in_parts {
-            if let Some(overtaken) = self.queue.ask(Asked { client, id, order: Box::new(order) }) {
-                tell_overtaken(&self.hub, client, overtaken.id);
+            let overtaken = self.queue.ask(Asked { client, id, order: Box::new(order) });
+            if let Some(Asked { client, id, .. }) = overtaken {
+                tell_forecast(&self.hub, client, id, Err(OVERTAKEN));
             }
             return Ok(());
         }
-        let forecaster =
-            self.forecaster.get().ok_or("there is no mesh yet whose shape could be changed")?;
+        let forecaster = self.forecaster.get().ok_or(NO_MESH)?;
         let hub = Arc::clone(&self.hub);
-        forecaster.ask(client, &order, move |forecast| match forecast {
-            Some(forecast) => {
-                hub.tell_client(client, move || json!({"forecast": {"id": id, "order": forecast}}));
-            }
-            None => tell_overtaken(&hub, client, id),
-        });
+        forecaster.ask(client, &order, move |forecast| tell_forecast(&hub, client, id, forecast));
         Ok(())
     }
 }
 
-/// Tells a client that its forecast was forgotten.
-fn tell_overtaken(hub: &Hub, client: u64, id: Option<String>) {
-    let message = "a later forecast of the same client has taken the place of this one";
-    hub.tell_client(client, move || json!({"error": {"message": message, "id": id}}));
+/// Why there is no forecast.
+const NO_MESH: &str = "there is no mesh yet whose shape could be changed";
+
+/// Tells a client what an order would come to, or why that is not found out.
+fn tell_forecast(
+    hub: &Hub,
+    client: u64,
+    id: Option<String>,
+    forecast: Result<Forecast, &'static str>,
+) {
+    hub.tell_client(client, move || match forecast {
+        Ok(forecast) => json!({"forecast": {"id": id, "order": forecast}}),
+        Err(message) => json!({"error": {"message": message, "id": id}}),
+    });
 }
 
 /// Refuses a command from the network that names a file of this machine.

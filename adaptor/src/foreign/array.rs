@@ -83,8 +83,8 @@ impl<'call> Array<'call> {
     ///
     /// # Safety
     /// From `first` on there are `count` numbers of this type, `stride` bytes apart (not aligned,
-    /// it may be), that live and do not change during `'call`; `count * stride` is at most
-    /// `isize::MAX`.
+    /// it may be), that live and do not change during `'call`, nor does what lies between them, all
+    /// of which can be read; `count * stride` is at most `isize::MAX`.
     pub unsafe fn new(
         first: *const u8,
         count: usize,
@@ -100,8 +100,9 @@ impl<'call> Array<'call> {
     /// from one column to the next: of any sign, and not aligned, it may be. It is read row by row.
     ///
     /// # Safety
-    /// There is a number of this type at every `first + row * strides[0] + column * strides[1]`,
-    /// that lives and does not change during `'call`; all lie in one piece of memory.
+    /// There is a number of this type at every `first + row * strides[0] + column * strides[1]`. All
+    /// lie in one piece of memory, which lives and does not change during `'call` from the lowest of
+    /// them to the highest, and can be read.
     pub unsafe fn table(
         first: *const u8,
         [rows, columns]: [usize; 2],

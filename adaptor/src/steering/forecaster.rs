@@ -57,18 +57,18 @@ impl Forecaster {
         }
     }
 
-    /// Has `answer` called with what `order` would come to, were it given now. What the same
-    /// `asker` asked for before and what has not begun is forgotten, and answered with `None`.
+    /// Has `answer` called with what `order` would come to, were it given now, or with why that is
+    /// not found out. A question of the same `asker` that has not begun is forgotten, and told so.
     pub(crate) fn ask(
         &self,
         asker: u64,
         order: &Order,
-        answer: impl FnOnce(Option<Forecast>) + Send + 'static,
+        answer: impl FnOnce(Result<Forecast, &'static str>) + Send + 'static,
     ) {
         let Planning::Beside(jobs) = &self.planning else {
             let reason = "only all ranks together can tell, at a safe point";
             let seconds = ShapeSeconds::default();
-            return answer(Some(Forecast::rejected(reason.into(), None, None, seconds)));
+            return answer(Ok(Forecast::rejected(reason.into(), None, None, seconds)));
         };
         let Present { defaults, stack, here, own } = lock(&self.present).clone();
         match defaults.request(&stack, here, order) {
@@ -77,7 +77,7 @@ impl Forecaster {
             }
             Err(error) => {
                 let Rejection { reason, seconds, .. } = Rejection::from(error);
-                answer(Some(Forecast::rejected(reason, None, None, seconds)));
+                answer(Ok(Forecast::rejected(reason, None, None, seconds)));
             }
         }
     }

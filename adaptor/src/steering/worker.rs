@@ -43,9 +43,13 @@ pub(crate) enum Done {
 /// How long the end of a run waits for a thread that is at work.
 const END: Duration = Duration::from_secs(2);
 
-/// Takes the answer to a forecast, on the worker's thread; `None`, on the thread of the one who asks,
-/// where what the same asker wanted to know later has taken its place.
-pub(crate) type Answer = Box<dyn FnOnce(Option<Forecast>) + Send>;
+/// Takes the answer to a forecast, on the worker's thread, or why there is none, on any thread.
+pub(crate) type Answer = Box<dyn FnOnce(Result<Forecast, &'static str>) + Send>;
+
+/// Why a forecast is not answered that has not begun.
+pub(crate) const OVERTAKEN: &str =
+    "a later forecast of the same client has taken the place of this one";
+const GONE: &str = "the mesh whose shape could be changed is gone";
 
 /// A forecast that waits, and who asked for it.
 struct Question {
@@ -147,14 +151,34 @@ impl Jobs {
     /// Asks for a forecast, in place of what the same asker wanted to know before and was not told
     /// yet.
     pub(crate) fn forecast(&self, asker: u64, asked: PlanRequest, answer: Answer) {
-        let mut overtaken = None;
+        let question = Question { asker, asked, answer };
+        let unanswered = {
+            let mut state = lock(&self.state);
+            if state.closed {
+                Some((question, GONE))
+            } else {
+                let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
+                let overtaken = before.and_then(|index| state.forecasts.remove(index));
+                state.forecasts.push_back(question);
+                overtaken.map(|overtaken| (overtaken, OVERTAKEN))
+            }
+        };
+        self.changed.notify_one();
+        if let Some((Question { answer, .. }, why)) = unanswered {
+            answer(Err(why));
+        }
+    }
+
+    /// Has the thread end, and tells those whose forecasts have not begun.
+    fn close(&self) {
+        self.give_up();
+        let mut waiting = VecDeque::new();
         self.change(|state| {
-            let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
-            overtaken = before.and_then(|index| state.forecasts.remove(index));
-            state.forecasts.push_back(Question { asker, asked, answer });
+            state.closed = true;
+            waiting = std::mem::take(&mut state.forecasts);
         });
-        if let Some(Question { answer, .. }) = overtaken {
-            answer(None);
+        for Question { answer, .. } in waiting {
+            answer(Err(GONE));
         }
     }
 }
@@ -259,8 +283,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        self.jobs.give_up();
-        self.jobs.change(|state| state.closed = true);
+        self.jobs.close();
         let until = Instant::now() + END;
         while !self.threads.iter().all(JoinHandle::is_finished) {
             if Instant::now() >= until {
@@ -295,7 +318,7 @@ fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queu
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
             Job::Forecast(Question { asked, answer, .. }) => {
                 let forecast = lock(planner).forecast(&asked);
-                answer(Some(forecast));
+                answer(Ok(forecast));
                 continue;
             }
             Job::Ahead(asked) => {

@@ -86,6 +86,22 @@ def test_cells_in_vtk_form_are_borrowed_where_they_lie(dtype):
     assert sorted(arrays(mesh(cells=cells), "cells")) == sorted(lies)
 
 
+def test_polygons_in_vtk_form_are_the_same_cells_borrowed_and_copied():
+    """A solver hands over its cells anew, and in other types: they are no other cells."""
+    axis = np.linspace(0, 1, 5)
+    points = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((5, 5))], -1).reshape(-1, 3)
+    numbers = np.arange(25).reshape(5, 5)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], -1).reshape(-1, 4)
+    offsets = np.arange(0, quads.size + 1, 4)
+    pipelines = [{"name": "area", "stages": [{"surface": {}}, {"statistics": {"field": "height"}}]}]
+    with tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": pipelines}) as adaptor:
+        for cycle in range(6):
+            types = np.full(len(quads), 7, np.uint8 if cycle < 3 else np.int64)
+            cells = {"connectivity": quads.ravel().copy(), "offsets": offsets.copy(), "types": types}
+            shown = tombolo.Mesh(points, cells, {"height": points[:, 2].copy()})
+            adaptor.execute(cycle, 0.1 * cycle, 0.1, {"plate": shown})
+
+
 def test_other_cells_are_copied():
     offsets, types = np.arange(0, TETS.size + 1, 4), np.full(len(TETS), 10)
     for cells in (

@@ -249,7 +249,7 @@ def test_a_run_is_followed_and_steered_in_plain_vtk(plugin, solver):
     assert rows()["stack"] == "0 edits"
     order.Give()
     wait(lambda: rows().get("status", "").startswith("applied"))
-    wait(lambda: rows()["stack"] == "1 edits")
+    wait(lambda: rows()["stack"] == "1 edit")
     # It is told before the solver has taken the coordinates.
     wait(lambda: solver.points[:, 2].max() == pytest.approx(0.8))
     order.Undo()

@@ -1,6 +1,7 @@
 """ParaView with its interface, on a screen in memory: it steers a running nozzle, and follows it by itself."""
 
 import contextlib
+import ctypes
 import os
 import shutil
 import subprocess
@@ -13,6 +14,8 @@ from conftest import FLOW, GALLERY, study, wait
 from test_paraview import SURFACE, check_shown, paraview
 
 SCREEN = (1152, 768)
+#: Where the buttons of *Tombolo Order* are on it, below its properties.
+BUTTONS = {"Forecast": (138, 635), "Give": (138, 664), "Undo": (138, 693)}
 SCRIPT = """
 import os
 from pathlib import Path
@@ -50,12 +53,30 @@ order = TomboloOrder(Input=pinched, Link=link, Steps=10, Every=2)
 simple.Hide(surface, view)
 order.SMProxy.InvokeCommand("Give")
 order.UpdatePipeline()
+run.SMProxy.AddObserver("UpdateDataEvent", tell)
+
+
+def write_table(*_):
+    rows = servermanager.Fetch(order).GetRowData()
+    columns = [rows.GetAbstractArray(column) for column in range(rows.GetNumberOfArrays())]
+    lines = [[column.GetVariantValue(row).ToString() for column in columns] for row in range(rows.GetNumberOfTuples())]
+    (out / "table.txt").write_text(os.linesep.join(": ".join(line) for line in lines))
+
+
+order.SMProxy.AddObserver("UpdateDataEvent", write_table)
+# A table is kept up to date where it is shown.
+layout = simple.GetLayout(view)
+layout.SplitViewVertical(view, 0.65)
+sheet = simple.CreateView("SpreadSheetView")
+simple.AssignViewToLayout(sheet, layout)
+simple.Show(order, sheet)
+simple.Render(sheet)
+simple.SetActiveView(view)
 view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = [2.1, 0, 0.25], [0, 0, 0], [0, 0, 1]
 view.ResetCamera()
-simple.GetActiveCamera().Zoom(1.6)
+simple.GetActiveCamera().Zoom(2.4)
 simple.Render()
-run.SMProxy.AddObserver("UpdateDataEvent", tell)
-# From here on the script does nothing: the interface asks for what is new.
+simple.SetActiveSource(order)
 """
 
 
@@ -86,6 +107,23 @@ def screen(tmp_path):
                 yield f":{told.readline().strip()}", folder / "Xvfb_screen0"
         finally:
             server.terminate()
+
+
+def press(display, button):
+    """Presses a button with the mouse."""
+    x11, xtest = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    screen = ctypes.c_void_p(x11.XOpenDisplay(display.encode()))
+    try:
+        xtest.XTestFakeMotionEvent(screen, -1, *BUTTONS[button], ctypes.c_ulong(0))
+        x11.XSync(screen, 0)
+        # Something that is pointed at lights up first.
+        time.sleep(0.3)
+        for is_down in (1, 0):
+            xtest.XTestFakeButtonEvent(screen, 1, is_down, ctypes.c_ulong(0))
+        x11.XSync(screen, 0)
+    finally:
+        x11.XCloseDisplay(screen)
 
 
 @contextlib.contextmanager
@@ -136,12 +174,21 @@ def test_the_interface_steers_a_run_and_follows_it(small_nozzle, screen, tmp_pat
         # What is fetched is drawn a moment later.
         time.sleep(1)
         pixels = picture(memory)
+        # A person has the mouse.
+        table = tmp_path / "table.txt"
+        press(display, "Forecast")
+        wait(lambda: table.exists() and "forecast: applied" in table.read_text(), 60)
+        for button, edits in (("Undo", 0), ("Give", 1), ("Undo", 0)):
+            count = len(run.orders)
+            press(display, button)
+            wait(lambda count=count: len(run.orders) > count and run.orders[-1].status == "applied", 60)
+            assert run.edit_count == edits, button
     assert np.all(np.diff(cycles()) >= 0)
     told = (tmp_path / "told.txt").read_text()
     assert [told.count(f"{what}: applied") for what in ("forecast", "order", "undo")] == [3, 3, 3], told
     check_shown(tmp_path)
 
-    view = pixels[200:720, 310:1140].astype(int)
+    view = pixels[205:525, 310:1140].astype(int)
     red = (view[..., 0] > view[..., 2] + 30).any(axis=0)
     drawn = np.abs(view - view[0, 0]).max(axis=-1) > 40
     heights = drawn.sum(axis=0)

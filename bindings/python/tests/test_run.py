@@ -351,6 +351,9 @@ def test_a_link_file_that_is_not_there_is_named_with_its_folder(tmp_path, monkey
     for given, named in (("run.link", tmp_path / "run.link"), ("~/run.link", tmp_path / "home/run.link")):
         with pytest.raises(tombolo.LinkError, match=rf"no file '{named}'"):
             tombolo.connect(given)
+    with pytest.raises(tombolo.LinkError) as refused:
+        tombolo.connect("127.0.0.1:7070/?token=secret")
+    assert "secret" not in str(refused.value)
     with pytest.raises(TypeError, match=r"link: found b'run\.link'"):
         tombolo.connect(b"run.link")
 

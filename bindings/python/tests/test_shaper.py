@@ -512,3 +512,9 @@ def test_truth_values_number_no_vertices():
     ):
         with pytest.raises(tombolo.MeshError, match=f"{what}: found an array of bool, expected vertex numbers"):
             tombolo.Shaper(*given)
+
+
+def test_polyhedra_of_meshio_are_refused_by_what_they_are():
+    faces = [[np.array([0, 1, 2]), np.array([0, 1, 3]), np.array([1, 2, 3, 0])]]
+    with pytest.raises(tombolo.MeshError, match="found polyhedra"):
+        tombolo.Shaper(meshio.Mesh(np.eye(4, 3), [("polyhedron4", faces)]))

@@ -44,6 +44,7 @@ struct Table {
 
 impl Table {
     fn position(&self, index: usize) -> usize {
+        assert!(index < self.rows * self.columns, "number {index} of a table");
         let [row, column] = self.strides.map(isize::cast_unsigned);
         self.first
             .wrapping_add((index / self.columns).wrapping_mul(row))

@@ -210,12 +210,14 @@ pub enum MeshError {
     },
     /// Offsets that are not those of compressed rows.
     #[error(
-        "cell {cell}: its connectivity would run from {start} to {end} in an array of {length}"
+        "cell {cell}: its connectivity would run from {} to {} in an array of {length}",
+        start.cast_signed(),
+        end.cast_signed()
     )]
     Offsets {
         /// The cell.
         cell: usize,
-        /// Where it starts.
+        /// Where it starts; negative numbers are told as such, here and at the end.
         start: u64,
         /// Where it ends.
         end: u64,

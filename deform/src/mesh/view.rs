@@ -254,6 +254,7 @@ pub(super) fn mixed_cell(
         CellType::from_vtk(types[cell]).ok_or(MeshError::UnknownCellType { cell, number })?;
     let (start, end) = (offsets.get(cell), offsets.get(cell + 1));
     if start > end || end > length as u64 {
+        let (start, end) = (offsets.signed(cell), offsets.signed(cell + 1));
         return Err(MeshError::Offsets { cell, start, end, length });
     }
     Ok((cell_type, start as usize..end as usize))

@@ -72,15 +72,14 @@ impl CellsView<'_> {
             CellsView::Types(types) => check_whole(types),
             CellsView::Mixed { types, offsets, connectivity } => {
                 check_length("offsets", offsets.len(), types.len() + 1)?;
-                let (start, end, length) =
-                    (offsets.get(0), offsets.get(types.len()), connectivity.len());
+                let (length, count) = (connectivity.len(), types.len());
+                let (start, end) = (offsets.get(0), offsets.get(count));
                 if start > end || end > length as u64 {
-                    return Err(MeshError::Offsets {
-                        cell: types.len().saturating_sub(1),
-                        start,
-                        end,
-                        length,
-                    });
+                    // The cell whose offset lies outside.
+                    let cell = if start > length as u64 { 0 } else { count.saturating_sub(1) };
+                    let ends = [cell, (cell + 1).min(count)];
+                    let [start, end] = ends.map(|index| offsets.signed(index));
+                    return Err(MeshError::Offsets { cell, start, end, length });
                 }
                 Ok(())
             }
@@ -366,6 +365,22 @@ mod tests {
         let types = [tets, (CellType::Polygon, Indices::EMPTY)];
         let found = CellsView::Types(&types).check_lengths().unwrap_err();
         assert!(matches!(found, MeshError::CellType { cell: 3, .. }), "{found}");
+    }
+
+    #[test]
+    fn an_offset_below_0_is_told_as_it_was_given_with_its_cell() {
+        let (types, connectivity) = ([10; 3], [0_u32; 12]);
+        for (offsets, cell) in [([-1, 4, 8, 12], 0), ([0, 4, 8, -5], 2), ([0, -7, 8, 12], 0)] {
+            let view = CellsView::Mixed {
+                types: &types,
+                offsets: Indices::from(&offsets[..]),
+                connectivity: Indices::from(&connectivity[..]),
+            };
+            let error = view.validate(4).unwrap_err();
+            assert!(matches!(error, MeshError::Offsets { cell: found, .. } if found == cell));
+            let least = offsets.iter().min().map(i64::to_string).unwrap_or_default();
+            assert!(error.to_string().contains(&least), "{error}");
+        }
     }
 
     #[test]

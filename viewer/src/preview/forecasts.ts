@@ -48,6 +48,7 @@ export class Forecasts {
   answer(answer: ForecastAnswer): void {
     if (answer.id) this.overtaken.delete(answer.id);
     if (this.asked === null || answer.id !== this.asked) return;
+    this.asked = null;
     this.store.dispatch({ type: "forecast told", answer: answer.order });
   }
 
@@ -56,6 +57,7 @@ export class Forecasts {
     // Nobody wants to know any more.
     if (this.overtaken.delete(id)) return true;
     if (this.asked === null || id !== this.asked) return false;
+    this.asked = null;
     this.store.dispatch({ type: "forecast failed", reason });
     return true;
   }

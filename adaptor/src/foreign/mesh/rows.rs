@@ -52,6 +52,11 @@ impl<'call> Rows<'call> {
         }
     }
 
+    /// Whether each row ends where the next begins ([`between`](Self::between)).
+    pub(super) fn has_offsets(&self) -> bool {
+        matches!(self.extents, Extents::Offsets(_))
+    }
+
     /// The offsets and the connectivity as they lie in the solver's memory, where they can be lent.
     pub(super) fn lent(&self) -> Option<(Indices<'call>, Indices<'call>)> {
         match &self.extents {

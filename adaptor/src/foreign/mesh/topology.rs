@@ -145,12 +145,8 @@ impl<'call> Topology<'call> {
                 connectivity: connectivity.indices()?,
             }),
             Topology::Types(types) => types.lent.as_deref().map(CellsView::Types),
-            Topology::Mixed { cells, shapes, map, faces: None, .. } => {
-                // The kernel knows cells by VTK's numbers.
-                let is_of_vtk = |(number, cell_type): &(i64, CellType)| {
-                    *number == i64::from(cell_type.vtk()) && *cell_type != CellType::Polyhedron
-                };
-                let (offsets, connectivity) = cells.lent().filter(|_| map.iter().all(is_of_vtk))?;
+            Topology::Mixed { cells, shapes, map, faces: None, .. } if is_of_vtk(cells, map) => {
+                let (offsets, connectivity) = cells.lent()?;
                 Some(CellsView::Mixed { types: shapes.bytes()?, offsets, connectivity })
             }
             _ => None,
@@ -242,7 +238,9 @@ impl<'call> Topology<'call> {
                     }
                     let pushed = match cell_type {
                         CellType::Polyhedron => push_polyhedron(cells, &faces, row, shift, points),
-                        CellType::Polygon => push_polygon(cells, &shifted(row)),
+                        CellType::Polygon if !is_of_vtk(rows, map) => {
+                            push_polygon(cells, &shifted(row))
+                        }
                         fixed => {
                             cells.push(*fixed, &shifted(row)).map_err(|error| error.to_string())
                         }
@@ -301,6 +299,15 @@ impl<'call> Topology<'call> {
             }
         }
     }
+}
+
+/// Whether cells are described as VTK does it, and the kernel: those that can be lent are then the
+/// cells that they are when they are copied.
+fn is_of_vtk(cells: &Rows<'_>, map: &[(i64, CellType)]) -> bool {
+    let is_of_vtk = |(number, cell_type): &(i64, CellType)| {
+        *number == i64::from(cell_type.vtk()) && *cell_type != CellType::Polyhedron
+    };
+    cells.has_offsets() && map.iter().all(is_of_vtk)
 }
 
 /// A polygon as what it is: a triangle and a quadrilateral have types of their own.

@@ -39,6 +39,7 @@ def _check_linear(kind: str) -> None:
 
 def _kind(block: Any) -> str:
     """The type of a block of meshio, of polygons with the number of their corners: it is one number in each block."""
+    _check_linear(block.type)
     if block.type.rstrip("0123456789") != "polygon":
         return str(block.type)
     if np.ndim(block.data) != 2:
@@ -92,8 +93,6 @@ def of_meshio(mesh: Any) -> Mesh:
             # 0 is that of no group; one below 0 says that a surface is turned round in its group.
             rows, numbers = rows[first], np.where(numbers == 0, -1, np.abs(numbers))[first]
         parts[kind] = rows, numbers
-    for kind in parts:
-        _check_linear(kind)
     # Faces and edges beside volume cells are of the boundary. A type that is not known is kept, and refused by name.
     most = max((_dimension(kind) or 0 for kind in parts), default=0)
     cells = {kind: rows for kind, (rows, _) in parts.items() if _dimension(kind) in (most, None)}

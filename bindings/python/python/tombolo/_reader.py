@@ -233,6 +233,9 @@ class Reader:
         except StopIteration as end:
             result: Result = end.value
             return result
+        finally:
+            # What was interrupted lets go of what it holds at once.
+            parts.close()
 
     def _over(self, failure: TomboloError) -> TomboloError:
         end = self._state.end

@@ -111,6 +111,9 @@ async def _carry_out(reader: Reader, parts: Parts[Result]) -> Result:
     except StopIteration as end:
         result: Result = end.value
         return result
+    finally:
+        # What was cancelled lets go of what it holds at once.
+        parts.close()
 
 
 async def _in_thread(call: Callable[[], Result]) -> Result:

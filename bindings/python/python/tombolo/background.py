@@ -191,6 +191,8 @@ class Requests:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        # Held by the thread whose forecast is under way.
+        self._foretelling = threading.Lock()
         self._count = 0
         # Of each kind the number of the last question, and its answer.
         self._asked: dict[str, int] = {}
@@ -206,8 +208,12 @@ class Requests:
     def forecast(self, run: Run, edits: Edits, **settings: Any) -> None:
         """Ask what an order would come to. Parameters as of `Run.forecast`."""
 
-        def ask() -> str:
-            forecast = run.forecast(edits, **settings)
+        def ask(is_newest: Callable[[], bool]) -> str:
+            # One waits for the other, and all but the last of those that wait are of no interest any more.
+            with self._foretelling:
+                if not is_newest():
+                    return "overtaken"
+                forecast = run.forecast(edits, **settings)
             reason = "" if forecast.reason is None else f", {forecast.reason}"
             return f"{forecast.outcome}, least scaled Jacobian {forecast.min_scaled_jacobian}{reason}"
 
@@ -215,22 +221,26 @@ class Requests:
 
     def order(self, run: Run, edits: Edits, **settings: Any) -> None:
         """Give an order. Parameters as of `Run.order`."""
-        self._begin("order", lambda: run.order(edits, **settings))
+        self._begin("order", lambda _: run.order(edits, **settings))
 
     def undo(self, run: Run) -> None:
         """Take the last order back."""
-        self._begin("undo", run.undo)
+        self._begin("undo", lambda _: run.undo())
 
-    def _begin(self, title: str, ask: Callable[[], Union[Order, str]]) -> None:
+    def _begin(self, title: str, ask: Callable[[Callable[[], bool]], Union[Order, str]]) -> None:
+        """Have a thread ask; it is told by a function whether its question is the newest of its kind."""
         with self._lock:
             self._count += 1
             number = self._asked[title] = self._count
             self._answers[title] = "asked"
 
+        def is_newest() -> bool:
+            return self._asked[title] == number
+
         def work() -> None:
             order: Optional[Order] = None
             try:
-                answer = ask()
+                answer = ask(is_newest)
                 if isinstance(answer, Order):
                     order, answer = answer, f"given as {answer.id}"
             except TomboloError as error:
@@ -240,7 +250,7 @@ class Requests:
                 answer = f"failed: {_said(error)}"
             with self._lock:
                 # A later question may have been answered sooner.
-                if self._asked[title] == number:
+                if is_newest():
                     self._answers[title] = answer
                 if order is not None and self._order[0] < number:
                     self._order = number, order

@@ -224,7 +224,8 @@ class Run(Watched):
         schedule, deform, guard : dict, optional
             As of `order`.
         timeout : float, optional
-            Seconds to wait for the wheel, and then for the answer, at most.
+            Seconds to wait for the wheel, and then for the answer, at most. Before it come the answers to forecasts
+            that other threads and tasks have asked for by this client.
 
         Returns
         -------
@@ -256,7 +257,7 @@ class Run(Watched):
         A run finds out one at a time for each client, and forgets what has not begun when the next one is asked for. So
         those of several threads and tasks take turns here.
         """
-        begin, turn, in_vain = clock.monotonic(), object(), "no answer to the forecast came"
+        begin, turn = clock.monotonic(), object()
 
         def has_turn() -> bool:
             if self._foretells is None:
@@ -266,13 +267,14 @@ class Run(Watched):
         def answer() -> Optional[tuple[str, Any]]:
             return self._state.answers.get(question)
 
-        yield has_turn, timeout, in_vain
         try:
+            yield has_turn, timeout, "the turn of the forecast, behind others of this client, did not come"
             question = self._reader.client.forecast(prepared)
-            kind, data = yield answer, left(begin, timeout), in_vain
+            kind, data = yield answer, left(begin, timeout), "no answer to the forecast came"
         finally:
-            with self._reader.looking_again():
-                self._foretells = None
+            if self._foretells is turn:
+                with self._reader.looking_again():
+                    self._foretells = None
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])
@@ -335,7 +337,9 @@ class Run(Watched):
         identity = id_of(order, "order")
         return self._give(lambda: self._reader.client.cancel(identity), "cancel", wait, timeout)
 
-    def set(self, parameter: str, value: SupportsFloat, *, wait: bool = True, timeout: Optional[float] = None) -> Command:
+    def set(
+        self, parameter: str, value: SupportsFloat, *, wait: bool = True, timeout: Optional[float] = None
+    ) -> Command:
         """Give a parameter of the solver a new value, within its bounds.
 
         Parameters
@@ -637,13 +641,10 @@ def connect(
     text = os.fspath(link)
     if not isinstance(text, str):
         raise TypeError(f"link: found {text!r}, expected a text or a path")
-    if "://" not in text and not text.startswith("unix:"):
-        path = os.path.expanduser(text)
-        if not os.path.isfile(path):
-            raise LinkError(
-                f"found no file {os.path.abspath(path)!r}, and no link; expected http://HOST:PORT/?token=TOKEN or a "
-                "file that has it, which a run takes away as it ends"
-            )
+    path = os.path.expanduser(text)
+    # What has a secret in it is a link, which the client refuses without the secret.
+    may_be_file = "://" not in text and "?" not in text and not text.startswith("unix:")
+    if may_be_file and os.path.isfile(path):
         try:
             with open(path, encoding="utf-8") as file:
                 words = file.read(1 << 16).split()
@@ -653,6 +654,11 @@ def connect(
         if not links:
             raise LinkError(f"{text}: found a file without a link, expected http://HOST:PORT/?token=TOKEN in it")
         text = links[0]
+    elif may_be_file:
+        raise LinkError(
+            f"found no file {os.path.abspath(path)!r}, and no link; expected http://HOST:PORT/?token=TOKEN or a file "
+            "that has it, which a run takes away as it ends"
+        )
     retries, patience = whole(attempts, "attempts", 0), None if timeout is None else seconds(timeout)
     # A text would be taken for a list of letters.
     if isinstance(views, str):
