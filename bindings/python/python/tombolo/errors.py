@@ -1,6 +1,7 @@
 """What can go wrong, a class for each kind.
 
-Every error of this package is a `TomboloError`. Texts are those of the library: they say what was found, where,
+What a mesh, an order or a run is wrong in is a `TomboloError`; a name that is not there is a `KeyError`, and an argument
+of another type a `TypeError`, as everywhere in Python. Texts are those of the library: they say what was found, where,
 what was expected, and the nearest name that is known.
 """
 
