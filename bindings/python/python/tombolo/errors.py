@@ -1,8 +1,8 @@
 """What can go wrong, a class for each kind.
 
-What a mesh, an order or a run is wrong in is a `TomboloError`; a name that is not there is a `KeyError`, and an argument
-of another type a `TypeError`, as everywhere in Python. Texts are those of the library: they say what was found, where,
-what was expected, and the nearest name that is known.
+What is wrong with a mesh, an order or a run is a `TomboloError`; a name that is not there is a `KeyError`, and an
+argument of another type a `TypeError`, as everywhere in Python. Texts are those of the library: they say what was
+found, where, what was expected, and the nearest name that is known.
 """
 
 from __future__ import annotations
