@@ -89,9 +89,10 @@ pub(crate) struct Jobs {
 }
 
 impl Jobs {
-    fn change(&self, change: impl FnOnce(&mut WaitingJobs)) {
-        change(&mut lock(&self.state));
+    fn change<T>(&self, change: impl FnOnce(&mut WaitingJobs) -> T) -> T {
+        let changed = change(&mut lock(&self.state));
         self.changed.notify_one();
+        changed
     }
 
     /// The most urgent job; waits for one. `None` once the worker is to end.
@@ -152,18 +153,16 @@ impl Jobs {
     /// yet.
     pub(crate) fn forecast(&self, asker: u64, asked: PlanRequest, answer: Answer) {
         let question = Question { asker, asked, answer };
-        let unanswered = {
-            let mut state = lock(&self.state);
+        // Told once the lock is free.
+        let unanswered = self.change(|state| {
             if state.closed {
-                Some((question, GONE))
-            } else {
-                let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
-                let overtaken = before.and_then(|index| state.forecasts.remove(index));
-                state.forecasts.push_back(question);
-                overtaken.map(|overtaken| (overtaken, OVERTAKEN))
+                return Some((question, GONE));
             }
-        };
-        self.changed.notify_one();
+            let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
+            let overtaken = before.and_then(|index| state.forecasts.remove(index));
+            state.forecasts.push_back(question);
+            overtaken.map(|overtaken| (overtaken, OVERTAKEN))
+        });
         if let Some((Question { answer, .. }, why)) = unanswered {
             answer(Err(why));
         }
@@ -172,10 +171,9 @@ impl Jobs {
     /// Has the thread end, and tells those whose forecasts have not begun.
     fn close(&self) {
         self.give_up();
-        let mut waiting = VecDeque::new();
-        self.change(|state| {
+        let waiting = self.change(|state| {
             state.closed = true;
-            waiting = std::mem::take(&mut state.forecasts);
+            std::mem::take(&mut state.forecasts)
         });
         for Question { answer, .. } in waiting {
             answer(Err(GONE));

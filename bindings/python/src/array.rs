@@ -21,6 +21,8 @@ pub(crate) struct Layout {
     /// In bytes; 0 along the axes that there are not.
     strides: [isize; AXES],
     pub(crate) number: NumberType,
+    /// Whether they are truth values, which NumPy keeps as numbers 0 and 1.
+    pub(crate) is_truth: bool,
     big_endian: bool,
 }
 
@@ -69,6 +71,7 @@ impl Layout {
             shape: [1; AXES],
             strides: [0; AXES],
             number,
+            is_truth: array.dtype().kind() == b'b',
             big_endian,
         };
         for (own, length) in layout.shape.iter_mut().zip(given) {

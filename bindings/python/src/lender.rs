@@ -167,8 +167,9 @@ impl Lender {
             let expected = format!("(m, {vertices}), a row for each {cell_type}");
             return Err(argument(what, found, expected).into());
         }
-        if layout.number.is_real() && layout.shape[0] > 0 {
-            let found = format!("an array of {}", layout.number.name());
+        if layout.is_truth || layout.number.is_real() && layout.shape[0] > 0 {
+            let name = if layout.is_truth { "bool" } else { layout.number.name() };
+            let found = format!("an array of {name}");
             return Err(
                 argument(what, found, "vertex numbers: int32, int64 or another integer").into()
             );

@@ -12,7 +12,7 @@ use tombolo::deform::features::{FeatureSettings, check_feature_names, misplaced_
 use tombolo::deform::mesh::{self, FeatureSource, Mesh, Vector};
 use tombolo::deform::number::Number;
 use tombolo::deform::quality::{quality, scaled_jacobians};
-use tombolo::deform::shape::{CurrentStage, Refused, Request, Stage};
+use tombolo::deform::shape::{CurrentPhase, Phase, Refused, Request};
 use tombolo::deform::skeleton::{Skeleton, SkeletonError, SkeletonSettings};
 use tombolo::deform::surface::{Surface, SurfaceError};
 use tombolo::pipelines::files::read_displacements;
@@ -30,7 +30,7 @@ pub(crate) struct Shaper {
     mesh: Arc<Mesh>,
     surface: Arc<Surface>,
     cancellation: Cancellation,
-    stage: CurrentStage,
+    phase: CurrentPhase,
     /// Coordinates of a vertex as they were given.
     dimension: usize,
 }
@@ -54,6 +54,16 @@ fn check_features(mesh: &Mesh) -> Result<(), mesh::MeshError> {
     let mut numbers = tagged.tags.clone();
     numbers.sort_unstable();
     check_feature_names(&tagged.names, &numbers)
+}
+
+/// Refuses volume cells where each vertex has two coordinates.
+fn check_flat(mesh: &Mesh) -> PyResult<()> {
+    match mesh.cells().iter().find(|(cell_type, _)| cell_type.dimension() == 3) {
+        None => Ok(()),
+        Some((cell_type, _)) => Err(mistake(format!(
+            "points: found two coordinates, expected three: cells of type '{cell_type}' have a volume"
+        ))),
+    }
 }
 
 impl Shaper {
@@ -141,13 +151,16 @@ impl Shaper {
                     channels.0.first().ok_or_else(|| mistake("found no mesh, expected one"))?;
                 let mesh = Arc::new(channel.to_mesh().map_err(of_run)?);
                 check_features(&mesh).map_err(mistake)?;
+                if dimension == 2 {
+                    check_flat(&mesh)?;
+                }
                 let surface = Arc::new(of_mesh(&mesh, angle).map_err(mistake)?);
                 let shaper = tombolo::deform::shape::Shaper::new(&mesh, Arc::clone(&surface))
                     .map_err(mistake)?;
                 let shaper = shaper.with_clock(tombolo::steering::clock).in_plane(dimension == 2);
-                let (cancellation, stage) = (shaper.cancellation().clone(), shaper.stage().clone());
+                let (cancellation, phase) = (shaper.cancellation().clone(), shaper.phase().clone());
                 let shaper = Mutex::new(shaper);
-                Ok(Self { shaper, mesh, surface, cancellation, stage, dimension })
+                Ok(Self { shaper, mesh, surface, cancellation, phase, dimension })
             })
         })
     }
@@ -262,9 +275,9 @@ impl Shaper {
         Ok(dict)
     }
 
-    /// The name of the stage that the work under way is at, from any thread.
-    fn stage(&self) -> &'static str {
-        self.stage.get().name()
+    /// The name of the phase that the work under way is at, from any thread.
+    fn phase(&self) -> &'static str {
+        self.phase.get().name()
     }
 
     /// Has the work under way given up, from any thread.
@@ -276,7 +289,7 @@ impl Shaper {
     fn renew(&self) -> PyResult<()> {
         let _held = self.hold()?;
         self.cancellation.renew();
-        self.stage.enter(Stage::Surface);
+        self.phase.enter(Phase::Surface);
         Ok(())
     }
 }

@@ -95,7 +95,7 @@ def test_a_forecast_that_is_cancelled_holds_nothing_up(solver):
     async def ask(aio):
         forecast = asyncio.create_task(aio.forecast(SQUEEZE))
         begun = time.monotonic()
-        while aio.run._foretells is None and time.monotonic() < begun + 20:
+        while aio.run._forecasting is None and time.monotonic() < begun + 20:
             await asyncio.sleep(0.01)
         # It waits for the answer now.
         await asyncio.sleep(0.1)

@@ -127,8 +127,8 @@ impl Values<'_> {
     }
 }
 
-/// One component of an [`ArrayView`]: every `stride`-th value from `offset` on, in two's
-/// complement.
+/// One component of an [`ArrayView`]: every `stride`-th value from `offset` on. A stride that leads
+/// back is held in two's complement.
 #[derive(Debug, Clone, Copy)]
 struct Column<'a> {
     values: Values<'a>,
@@ -199,20 +199,20 @@ impl<'a> ArrayView<'a> {
         };
         let mut columns = [Column { values: first, offset: 0, stride: 1 }; 9];
         for (column, &(values, offset, stride)) in columns.iter_mut().zip(components) {
-            let last = || {
-                let span = isize::try_from(len - 1).ok()?.checked_mul(stride)?;
-                offset.checked_add_signed(span)
+            let needed = match len {
+                0 => Some(0),
+                _ => isize::try_from(len - 1)
+                    .ok()
+                    .and_then(|last| offset.checked_add_signed(last.checked_mul(stride)?))
+                    .and_then(|last| last.max(offset).checked_add(1)),
             };
-            let is_within =
-                len == 0 || offset < values.len() && last().is_some_and(|last| last < values.len());
-            if !is_within {
+            if needed.is_none_or(|needed| needed > values.len()) {
                 return Err(MeshError::ArrayLength {
-                    name: format!("component at {offset}, a value every {stride}"),
+                    name: "component".into(),
                     found: values.len(),
-                    expected: len,
+                    expected: needed.unwrap_or(usize::MAX),
                 });
             }
-            // Added in two's complement, a negative distance leads back.
             *column = Column { values, offset, stride: stride.cast_unsigned() };
         }
         let number = first.number();
@@ -401,3 +401,35 @@ macro_rules! scalars {
 }
 
 scalars!(f32: F32, f64: F64, i32: I32, i64: I64, u8: U8);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn components_are_read_forwards_backwards_and_at_one_place() {
+        let numbers: Vec<f64> = (0..9).map(f64::from).collect();
+        let of = |len, offset, stride| {
+            ArrayView::strided(len, &[(Values::F64(&numbers), offset, stride)])
+                .map(|view| (0..len).map(|tuple| view.get(tuple, 0)).collect::<Vec<_>>())
+        };
+        assert_eq!(of(3, 1, 3).unwrap(), [1.0, 4.0, 7.0]);
+        assert_eq!(of(3, 8, -4).unwrap(), [8.0, 4.0, 0.0]);
+        assert_eq!(of(4, 5, 0).unwrap(), [5.0; 4]);
+        assert_eq!(of(0, 99, -1).unwrap(), [0.0; 0]);
+        for (len, offset, stride, needed) in [
+            (4, 0, 3, 10),
+            (3, 8, -5, usize::MAX),
+            (1, 9, 0, 10),
+            (2, 9, -1, 10),
+            (2, 0, isize::MIN, usize::MAX),
+        ] {
+            let MeshError::ArrayLength { found, expected, .. } =
+                of(len, offset, stride).unwrap_err()
+            else {
+                panic!("{len} {offset} {stride}")
+            };
+            assert_eq!((found, expected), (9, needed), "{len} {offset} {stride}");
+        }
+    }
+}

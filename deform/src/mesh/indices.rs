@@ -51,23 +51,18 @@ impl Table {
             .wrapping_add((index % self.columns).wrapping_mul(column))
     }
 
-    /// Whether all its numbers are among so many.
-    fn is_within(&self, length: usize) -> bool {
-        if self.rows == 0 || self.columns == 0 {
-            return true;
+    /// Among how many numbers it lies at least; `None` where it begins before the first of them.
+    fn needed(&self) -> Option<usize> {
+        if self.rows.checked_mul(self.columns)? == 0 {
+            return Some(0);
         }
         let [row, column] = self.strides;
         let far = |count: usize, stride: isize| {
             isize::try_from(count - 1).ok().and_then(|last| last.checked_mul(stride))
         };
-        let corners = || {
-            let first = isize::try_from(self.first).ok()?;
-            let (down, along) = (far(self.rows, row)?, far(self.columns, column)?);
-            let lowest = first.checked_add(down.min(0))?.checked_add(along.min(0))?;
-            let highest = first.checked_add(down.max(0))?.checked_add(along.max(0))?;
-            Some((lowest, usize::try_from(highest).ok()?))
-        };
-        corners().is_some_and(|(lowest, highest)| lowest >= 0 && highest < length)
+        let (down, along) = (far(self.rows, row)?, far(self.columns, column)?);
+        self.first.checked_add_signed(down.min(0).checked_add(along.min(0))?)?;
+        self.first.checked_add_signed(down.max(0).checked_add(along.max(0))?)?.checked_add(1)
     }
 }
 
@@ -106,14 +101,14 @@ impl Indices<'_> {
         strides: [isize; 2],
     ) -> Result<Self, MeshError> {
         let table = Table { first, rows, columns, strides };
-        let count = rows.checked_mul(columns);
-        if self.table.is_none() && count.is_some() && table.is_within(self.integers.len()) {
+        let needed = table.needed().filter(|_| self.table.is_none());
+        if needed.is_some_and(|needed| needed <= self.integers.len()) {
             return Ok(Self { table: Some(table), ..self });
         }
         Err(MeshError::ArrayLength {
             name: format!("table of {rows} rows of {columns} numbers"),
             found: self.len(),
-            expected: count.unwrap_or(usize::MAX),
+            expected: needed.unwrap_or(usize::MAX),
         })
     }
 

@@ -15,8 +15,8 @@ pub enum CellsView<'a> {
         /// The vertices, cell after cell.
         connectivity: Indices<'a>,
     },
-    /// Those of one type, which has a fixed number of vertices, after those of another: for each
-    /// type the vertices, cell after cell.
+    /// Cells of several types with a fixed number of vertices each, type after type: the vertices,
+    /// cell after cell.
     Types(&'a [(CellType, Indices<'a>)]),
     /// Any mix of types but polyhedra.
     Mixed {

@@ -325,7 +325,7 @@ mod tests {
         cells
     }
 
-    /// The same tetrahedra, vertex by vertex as arrays of Fortran have them.
+    /// The tetrahedra as an array in Fortran order: the first vertex of each, then the second, ...
     fn columns() -> Vec<i32> {
         (0..4).flat_map(|corner| TETS.map(|tet| tet[corner])).collect()
     }

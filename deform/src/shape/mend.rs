@@ -14,7 +14,7 @@ use super::body::Body;
 use super::carry::Carrier;
 use super::plan::{CurrentShape, Plan, travel};
 use super::{
-    Deformation, Refused, Request, ShapeSeconds, Shaper, Stage, Target, check_stack, displaced,
+    Deformation, Phase, Refused, Request, ShapeSeconds, Shaper, Target, check_stack, displaced,
     moved,
 };
 use crate::communicator::Communicator;
@@ -198,7 +198,7 @@ impl Shaper {
     ) -> Result<Plan, Refused> {
         schedule.check()?;
         self.body.require_wanted()?;
-        let watch = self.stopwatch(Stage::Guard);
+        let watch = self.stopwatch(Phase::Guard);
         if target.surface_only || start.surface_only {
             let ends = check_ends(self.body.domain.mesh(), &start.points, &target.points);
             self.body.agree(ends.map_err(Refused::from))?;
@@ -243,7 +243,7 @@ impl Shaper {
                 }
                 linear => linear?,
             };
-            let watch = self.stopwatch(Stage::Guard);
+            let watch = self.stopwatch(Phase::Guard);
             let holds = lower == 0 || self.body.keeps(&self.reference, &linear.points, guard);
             linear.seconds.guard += watch.seconds();
             self.spent.guard += linear.seconds.guard;
@@ -283,7 +283,7 @@ impl Shaper {
         let Some((edit, below)) = stack.split_last().filter(|(edit, _)| !edit.muted()) else {
             return Ok(base);
         };
-        let watch = self.stopwatch(Stage::Volume);
+        let watch = self.stopwatch(Phase::Volume);
         let body = Arc::clone(&self.body);
         let positions = body.positions(&base.points);
         let set_up = self.operator(deform)?;

@@ -5,11 +5,11 @@ mod carry;
 mod deformation;
 mod forecast;
 mod mend;
+mod phase;
 mod plan;
 mod refused;
 mod request;
 mod saved;
-mod stage;
 mod surface_only;
 // Ranks are threads, which WebAssembly does not have.
 #[cfg(all(test, not(target_family = "wasm")))]
@@ -36,11 +36,11 @@ use carry::Carrier;
 pub use deformation::Deformation;
 pub use forecast::{Forecast, Outcome};
 use mend::Mended;
+pub use phase::{CurrentPhase, Phase};
 pub use plan::{CurrentShape, Judged, Plan};
 pub use refused::{Elsewhere, Refused};
 pub use request::Request;
 pub use saved::{SavedPlan, SavedPoints, SavedShape};
-pub use stage::{CurrentStage, Stage};
 
 /// Whether a stack may hold all of these edits.
 ///
@@ -162,7 +162,7 @@ pub struct Shaper {
     /// Shapes that took more than one solve, the newest last.
     mended: Vec<Mended>,
     spent: ShapeSeconds,
-    stage: CurrentStage,
+    phase: CurrentPhase,
     clock: fn() -> f64,
     /// Whether vertices may move along x and y alone.
     in_plane: bool,
@@ -229,7 +229,7 @@ impl Shaper {
             improver: None,
             mended: Vec::new(),
             spent: ShapeSeconds::default(),
-            stage: CurrentStage::default(),
+            phase: CurrentPhase::default(),
             clock: no_clock,
             in_plane: false,
         })
@@ -276,15 +276,15 @@ impl Shaper {
         &self.body.cancellation
     }
 
-    /// The stage of the plan that is under way, or of the last one.
+    /// The phase of the plan that is under way, or of the last one.
     #[must_use]
-    pub fn stage(&self) -> &CurrentStage {
-        &self.stage
+    pub fn phase(&self) -> &CurrentPhase {
+        &self.phase
     }
 
-    /// Enters a stage, and measures how long it takes.
-    fn stopwatch(&self, stage: Stage) -> Stopwatch {
-        self.stage.enter(stage);
+    /// Enters a phase, and measures how long it takes.
+    fn stopwatch(&self, phase: Phase) -> Stopwatch {
+        self.phase.enter(phase);
         Stopwatch { clock: self.clock, start: (self.clock)() }
     }
 
@@ -383,7 +383,7 @@ impl Shaper {
         deform.equation.validate()?;
         self.body.require_wanted()?;
         let mut seconds = ShapeSeconds::default();
-        let watch = self.stopwatch(Stage::Surface);
+        let watch = self.stopwatch(Phase::Surface);
         let body = Arc::clone(&self.body);
         let in_plane = self.in_plane;
         let displaced = displaced(self.editor.as_mut(), stack).and_then(|displacement| {
@@ -417,7 +417,7 @@ impl Shaper {
         if deform.surface_only {
             return self.of_surface(&surface, seconds);
         }
-        let watch = self.stopwatch(Stage::Volume);
+        let watch = self.stopwatch(Phase::Volume);
         let solution = self.operator(deform)?.solve(&surface).map(|solution| {
             let moved =
                 reference.iter().zip(&solution.displacement).map(|(&point, &by)| moved(point, by));
@@ -432,7 +432,7 @@ impl Shaper {
         self.spent.volume += seconds.volume;
         let (points, iterations) = solution?;
         if deform.lets_go() {
-            let watch = self.stopwatch(Stage::Surface);
+            let watch = self.stopwatch(Phase::Surface);
             let sound = body.gather(&points).and_then(|shape| body.require_sound(&shape, rule));
             seconds.surface += watch.seconds();
             self.spent.surface += watch.seconds();

@@ -28,7 +28,7 @@ pub enum Topology<'call> {
         /// The connectivity's label in errors.
         label: Label,
     },
-    /// Those of one type after those of another.
+    /// Cells of several types, type after type.
     Types(Types<'call>),
     /// Polygons.
     Polygonal(Rows<'call>),
@@ -56,7 +56,7 @@ pub enum Topology<'call> {
     },
 }
 
-/// Topologies of uniform cells, those of one after those of another.
+/// Cells of several types, type after type: a topology of uniform cells for each.
 #[derive(Debug, Clone)]
 pub struct Types<'call> {
     topologies: Vec<Topology<'call>>,
@@ -222,6 +222,7 @@ impl<'call> Topology<'call> {
             Topology::Mixed { cells: rows, shapes, map, faces, label, expected } => {
                 let faces =
                     faces.as_ref().map_or(Ok(Vec::new()), |faces| all_faces(faces, vertices))?;
+                let keeps_polygons = is_of_vtk(rows, map);
                 rows.for_each(u32::MAX as usize, |cell, row| {
                     if !keep(cell) {
                         return Ok(());
@@ -238,9 +239,7 @@ impl<'call> Topology<'call> {
                     }
                     let pushed = match cell_type {
                         CellType::Polyhedron => push_polyhedron(cells, &faces, row, shift, points),
-                        CellType::Polygon if !is_of_vtk(rows, map) => {
-                            push_polygon(cells, &shifted(row))
-                        }
+                        CellType::Polygon if !keeps_polygons => push_polygon(cells, &shifted(row)),
                         fixed => {
                             cells.push(*fixed, &shifted(row)).map_err(|error| error.to_string())
                         }

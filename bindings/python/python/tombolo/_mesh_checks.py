@@ -11,9 +11,6 @@ import numpy as np
 
 from .errors import MeshError
 
-#: The types of volume cells, by their names and by VTK's numbers.
-_VOLUMES = {"tetra", "voxel", "hexahedron", "wedge", "pyramid", "pentagonal prism", "hexagonal prism", *range(10, 17)}
-
 
 def part(mesh: Any, name: str) -> Any:
     """A part of a mesh, of a dict that is one, or of the only one in a dict; None where it has none."""
@@ -34,36 +31,13 @@ def check_faces(faces: Any) -> None:
             raise MeshError(f"the feature '{name}' has no faces, expected at least one")
 
 
-def check_numbers(what: str, given: Any) -> None:
-    """An error where vertices are numbered by an array of truth values."""
-    for key, rows in given.items() if isinstance(given, Mapping) else ():
-        if isinstance(rows, Mapping):
-            check_numbers(f"{what}['{key}']", rows)
-        elif getattr(rows, "dtype", None) == np.bool_:
-            raise MeshError(
-                f"{what}['{key}']: found an array of bool, expected vertex numbers: int32, int64 or another integer"
-            )
-
-
-def check_room(points: Any, cells: Any) -> None:
-    """An error where there are volume cells in a plane."""
-    # One array for each axis, or a row for each vertex.
-    is_separate = isinstance(points, (tuple, list)) and all(isinstance(axis, np.ndarray) for axis in points)
-    if (len(points) if is_separate else np.shape(points)[-1]) != 2 or not isinstance(cells, Mapping):
-        return
-    types = np.unique(cells["types"]).tolist() if "types" in cells else [kind for kind in cells if len(cells[kind])]
-    for kind in types:
-        if kind in _VOLUMES:
-            raise MeshError(f"points: found two coordinates, expected three: cells of type {kind!r} have a volume")
-
-
 def check_found(faces: Any, found: Collection[str]) -> None:
     """An error where all faces of a feature are of features before it, so that nothing of it was found."""
     names = list(faces) if isinstance(faces, Mapping) else []
     missing = [feature for feature, name in enumerate(names) if name not in found]
     if not missing:
         return
-    parts = [(feature, np.asarray(part)) for feature, name in enumerate(names) for part in _arrays_of(faces[name])]
+    parts = [(feature, np.asarray(rows)) for feature, name in enumerate(names) for rows in _arrays_of(faces[name])]
     parts = [(feature, part) for feature, part in parts if len(part)]
     widest = max(part.shape[1] for _, part in parts)
     # A face is the same whatever vertex it begins with; those with fewer vertices are filled up.

@@ -477,9 +477,10 @@ class Watched:
         if self._state.end is not None:
             return f"<tombolo.Run {place}, {self._state.end['how']} at cycle {self._state.end['cycle']}>"
         cycle = "no step told yet" if self._state.status is None else f"cycle {self._state.status.cycle}"
-        doing = ", driving" if self.drives else ""
         if not self.connected:
             doing = ", not connected"
         elif self.reconnecting:
             doing = ", connecting again"
+        else:
+            doing = ", driving" if self.drives else ""
         return f"<tombolo.Run {place}, {cycle}{doing}>"

@@ -218,42 +218,24 @@ class AsyncOrder:
 
         An order that another one, or an undo, goes on from is `applied` then too: see `Order.wait`.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds, at most; without it there is no limit.
-        until : {"applied", "applying", "computing", "accepted"}
-            How far it has to come.
+        Parameters and Raises are as of `Order.wait`.
 
         Returns
         -------
         Order
             The order itself: `order`.
-
-        Raises
-        ------
-        RejectedError, WaitError, EndedError, LinkError, ValueError
-            As of `Order.wait`.
         """
         return await _carry_out(self.order._run._reader, self.order._wait(timeout, until))
 
     async def cancel(self, *, timeout: Optional[float] = None) -> Command:
         """Take the order back, where it has not begun to move the mesh, and wait until that is done.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.cancel`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.cancel`.
         """
         return await self.order._run.aio.cancel(self.order, timeout=timeout)
 
@@ -330,26 +312,12 @@ class AsyncRun:
 
         A call that is cancelled while it waits for the wheel gives none.
 
-        Parameters
-        ----------
-        edits : list of dict, dict or path
-            As of `Run.order`.
-        schedule, deform, guard : dict, optional
-            As of `Run.order`.
-        replaces : Order, AsyncOrder or str, optional
-            An order that has not begun to move the mesh, whose place this one takes.
-        deadline : int, optional
-            Seconds that it may wait for its turn; it is rejected then.
+        Parameters and Raises are as of `Run.order`.
 
         Returns
         -------
         AsyncOrder
             The order, which has been sent.
-
-        Raises
-        ------
-        ConfigurationError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.order`.
         """
         prepared = await self._prepared(
             edits, schedule=schedule, deform=deform, guard=guard, replaces=replaces, deadline=deadline
@@ -362,20 +330,12 @@ class AsyncRun:
     async def undo(self, count: SupportsIndex = 1) -> AsyncOrder:
         """Take the last orders back, as `Run.undo` does.
 
-        Parameters
-        ----------
-        count : int
-            How many orders. The shape is the one before them then, to the bit.
+        Parameters and Raises are as of `Run.undo`.
 
         Returns
         -------
         AsyncOrder
             The order that takes them back, which has been sent.
-
-        Raises
-        ------
-        ConfigurationError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.undo`.
         """
         orders = whole(count, "count", 1)
         return AsyncOrder(Order(self.run, await self._send(lambda client: client.undo(orders))))
@@ -391,24 +351,12 @@ class AsyncRun:
     ) -> Forecast:
         """Ask what an order would come to, were it given now, as `Run.forecast` does; nothing changes.
 
-        Parameters
-        ----------
-        edits : list of dict, dict or path
-            As of `Run.order`.
-        schedule, deform, guard : dict, optional
-            As of `Run.order`.
-        timeout : float, optional
-            Seconds to wait for the wheel, and then for the answer, at most.
+        Parameters and Raises are as of `Run.forecast`.
 
         Returns
         -------
         Forecast
             What the order would come to.
-
-        Raises
-        ------
-        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.forecast`.
         """
         seconds(timeout)
         prepared = await self._prepared(edits, schedule=schedule, deform=deform, guard=guard)
@@ -418,39 +366,19 @@ class AsyncRun:
     async def hand_over(self, to: str, timeout: float = 60.0) -> None:
         """Give the wheel to another client, as `Run.hand_over` does; it is there when this returns.
 
-        Parameters
-        ----------
-        to : str
-            The client's name in the run, such as ``c4``.
-        timeout : float
-            Seconds to wait, at most.
-
-        Raises
-        ------
-        NotDriverError, RejectedError, WaitError, EndedError, LinkError
-            As of `Run.hand_over`.
+        Parameters and Raises are as of `Run.hand_over`.
         """
         await _in_thread(lambda: self.run.hand_over(to, timeout))
 
     async def link_for(self, rights: str = "watch", timeout: float = 60.0) -> str:
         """Make a link for somebody else, as `Run.link_for` does. It opens one browser, once.
 
-        Parameters
-        ----------
-        rights : {"watch", "drive"}
-            Whether that browser only watches, or may be the one that steers.
-        timeout : float
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.link_for`.
 
         Returns
         -------
         str
             The address: that of this run's own link, with a key in place of its token.
-
-        Raises
-        ------
-        ConfigurationError, RejectedError, WaitError, EndedError, LinkError
-            As of `Run.link_for`.
         """
         return await _in_thread(lambda: self.run.link_for(rights, timeout))
 
@@ -471,24 +399,12 @@ class AsyncRun:
     async def set(self, parameter: str, value: SupportsFloat, *, timeout: Optional[float] = None) -> Command:
         """Give a parameter of the solver a new value, as `Run.set` does, and wait until the solver has it.
 
-        Parameters
-        ----------
-        parameter : str
-            Its name.
-        value : float
-            Its new value, in the unit that the solver has it in.
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.set`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError, FailedError
-            As of `Run.set`.
         """
         given = number(value, f"parameter {parameter!r}")
         return await self._give(lambda client: client.set(parameter, given), "set", timeout)
@@ -496,40 +412,24 @@ class AsyncRun:
     async def pause(self, *, timeout: Optional[float] = None) -> Command:
         """Hold the solver at its next safe point, and wait until it is held.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.pause`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.pause`.
         """
         return await self._give(lambda client: client.pause(), "pause", timeout)
 
     async def resume(self, *, timeout: Optional[float] = None) -> Command:
         """Let the solver go on, and wait until it does.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.resume`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.resume`.
         """
         return await self._give(lambda client: client.resume(), "resume", timeout)
 
@@ -538,42 +438,24 @@ class AsyncRun:
 
         A run that ends before it has answered is no error.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.stop`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.stop`.
         """
         return await self._give(lambda client: client.stop(), "stop", timeout)
 
     async def cancel(self, order: Given, *, timeout: Optional[float] = None) -> Command:
         """Take back an order that has not begun to move the mesh, as `Run.cancel` does, and wait until that is done.
 
-        Parameters
-        ----------
-        order : Order, AsyncOrder or str
-            The order, or its id.
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.cancel`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.cancel`.
         """
         identity = id_of(order, "order")
         return await self._give(lambda client: client.cancel(identity), "cancel", timeout)
@@ -581,22 +463,12 @@ class AsyncRun:
     async def change_pipelines(self, change: Mapping[str, Any], *, timeout: Optional[float] = None) -> Command:
         """Change the pipelines while the run goes on, as `Run.change_pipelines` does, and wait until it is done.
 
-        Parameters
-        ----------
-        change : dict
-            What `Run.change_pipelines` takes: ``{"set": [...]}``, ``{"remove": [...]}`` or ``{"all": [...]}``.
-        timeout : float, optional
-            Seconds to wait, at most.
+        Parameters and Raises are as of `Run.change_pipelines`, without `wait`.
 
         Returns
         -------
         Command
             The command, which has taken effect.
-
-        Raises
-        ------
-        ConfigurationError, RejectedError, NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.change_pipelines`.
         """
         text = _json.text(change, "pipelines")
         return await self._give(lambda client: client.change_pipelines(text), "pipelines", timeout)
@@ -604,15 +476,7 @@ class AsyncRun:
     async def drive(self, timeout: Optional[float] = None) -> None:
         """Take the wheel, as `Run.drive` does: what every command does first.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds to wait, at most. Left out: as of `Run.drive`.
-
-        Raises
-        ------
-        NotDriverError, WaitError, EndedError, LinkError
-            As of `Run.drive`.
+        Parameters and Raises are as of `Run.drive`.
         """
         until = moment_after(WHEEL if timeout is None else timeout)
         while not await _in_thread(lambda: self.run._ask_for_wheel(until, timeout is None)):
@@ -621,133 +485,84 @@ class AsyncRun:
     async def surface(self) -> Surface:
         """Ask for the reference surface, from which all shapes are measured: what `Run.surface` is.
 
+        Raises are as of `Run.surface`.
+
         Returns
         -------
         Surface
             The surface. Its points are in the unit of length of the mesh.
-
-        Raises
-        ------
-        LinkError, EndedError, WaitError
-            As of `Run.surface`.
         """
         return await _in_thread(lambda: self.run.surface)
 
     async def stack(self) -> list[dict[str, Any]]:
         """Ask for the edits that make the present shape: what `Run.stack` is.
 
+        Raises are as of `Run.stack`.
+
         Returns
         -------
         list of dict
             The edits, the oldest first. Lengths are in the unit of length of the mesh, angles in degrees.
-
-        Raises
-        ------
-        EndedError, WaitError, LinkError
-            As of `Run.stack`.
         """
         return await _in_thread(lambda: self.run.stack)
 
     async def pipelines(self) -> list[dict[str, Any]]:
         """Ask for the pipelines as they are now: what `Run.pipelines` is.
 
+        Raises are as of `Run.pipelines`.
+
         Returns
         -------
         list of dict
             The pipelines, as the configuration has them.
-
-        Raises
-        ------
-        EndedError, WaitError, LinkError
-            As of `Run.pipelines`.
         """
         return await _in_thread(lambda: self.run.pipelines)
 
     async def wait_for(self, found: Callable[[], Found], timeout: Optional[float] = None) -> Found:
         """Wait until `found`, which is called on the loop, returns something true, as `Run.wait_for` does.
 
-        Parameters
-        ----------
-        found : callable
-            Looks at what is known, such as ``lambda: run.status.cycle > 100``. It must not wait itself.
-        timeout : float, optional
-            Seconds, at most; without it there is no limit.
+        Parameters and Raises are as of `Run.wait_for`.
 
         Returns
         -------
         object
             What `found` has returned.
-
-        Raises
-        ------
-        WaitError, EndedError, LinkError
-            As of `Run.wait_for`.
         """
         return await _wait_for(self.run._reader, found, timeout)
 
     async def wait_for_cycle(self, cycle: Cycle, timeout: Optional[float] = None) -> Status:
         """Wait until the solver has told a step from `cycle` on, and return its status.
 
-        Parameters
-        ----------
-        cycle : int
-            The step; a number from a table of monitors will do.
-        timeout : float, optional
-            Seconds, at most; without it there is no limit.
+        Parameters and Raises are as of `Run.wait_for_cycle`.
 
         Returns
         -------
         Status
             The newest status, which may be of a later step.
-
-        Raises
-        ------
-        ConfigurationError, WaitError, EndedError, LinkError
-            As of `Run.wait_for_cycle`.
         """
         return await self._carry_out(self.run._wait_for_cycle(cycle, timeout))
 
     async def wait_for_view(self, name: str, *, after: Optional[Cycle] = None, timeout: Optional[float] = None) -> View:
         """Wait for a frame of a view, and return it, as `Run.wait_for_view` does.
 
-        Parameters
-        ----------
-        name : str
-            The name of the view, one of `Run.view_names`.
-        after : int, optional
-            The step that the frame has to be later than. Left out: one that is there already will do.
-        timeout : float, optional
-            Seconds, at most; without it there is no limit.
+        Parameters and Raises are as of `Run.wait_for_view`.
 
         Returns
         -------
         View
             The newest frame of the view.
-
-        Raises
-        ------
-        KeyError, CallError, WaitError, EndedError, LinkError
-            As of `Run.wait_for_view`.
         """
         return await self._carry_out(self.run._wait_for_view(name, after, timeout))
 
     async def wait(self, timeout: Optional[float] = None) -> dict[str, Any]:
         """Wait until the run has ended, and return how.
 
-        Parameters
-        ----------
-        timeout : float, optional
-            Seconds, at most; without it there is no limit.
+        Parameters and Raises are as of `Run.wait`.
 
         Returns
         -------
         dict
             What `Run.end` is. `how` is `unknown`, and alone, where the run has gone without a word.
-
-        Raises
-        ------
-        WaitError, LinkError
-            As of `Run.wait`.
         """
         return await self._carry_out(self.run._wait_for_end(timeout))
 

@@ -192,7 +192,7 @@ class Requests:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         # Held by the thread whose forecast is under way.
-        self._foretelling = threading.Lock()
+        self._forecasting = threading.Lock()
         self._count = 0
         # Of each kind the number of the last question, and its answer.
         self._asked: dict[str, int] = {}
@@ -210,7 +210,7 @@ class Requests:
 
         def ask(is_newest: Callable[[], bool]) -> str:
             # One waits for the other, and all but the last of those that wait are of no interest any more.
-            with self._foretelling:
+            with self._forecasting:
                 if not is_newest():
                     return "overtaken"
                 forecast = run.forecast(edits, **settings)

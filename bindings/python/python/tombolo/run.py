@@ -55,10 +55,10 @@ class Run(Watched):
         For each pipeline that has monitors a table that grows.
     """
 
-    # ---- Steering.
-
     #: What stands for the forecast that is under way.
-    _foretells: Optional[object] = None
+    _forecasting: Optional[object] = None
+
+    # ---- Steering.
 
     @property
     def orders(self) -> list[Order]:
@@ -260,9 +260,9 @@ class Run(Watched):
         begin, turn = clock.monotonic(), object()
 
         def has_turn() -> bool:
-            if self._foretells is None:
-                self._foretells = turn
-            return self._foretells is turn
+            if self._forecasting is None:
+                self._forecasting = turn
+            return self._forecasting is turn
 
         def answer() -> Optional[tuple[str, Any]]:
             return self._state.answers.get(question)
@@ -272,9 +272,9 @@ class Run(Watched):
             question = self._reader.client.forecast(prepared)
             kind, data = yield answer, left(begin, timeout), "no answer to the forecast came"
         finally:
-            if self._foretells is turn:
+            if self._forecasting is turn:
                 with self._reader.looking_again():
-                    self._foretells = None
+                    self._forecasting = None
         if kind == "error":
             raise RejectedError(data["message"])
         return Forecast(data["order"])

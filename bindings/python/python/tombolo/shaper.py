@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _json, _native
 from ._identity import by_identity
-from ._mesh_checks import check_faces, check_found, check_numbers, check_room, degrees, part, what_it_is
+from ._mesh_checks import check_faces, check_found, degrees, part, what_it_is
 from ._meshio import of_meshio
 from ._waiting import in_thread
 from .errors import MeshError
@@ -26,7 +26,7 @@ __all__ = ["Progress", "Shape", "Shaper", "Skeleton"]
 
 Result = TypeVar("Result")
 Progress = Callable[[str, float], object]
-"""Called about ten times a second with the stage and the seconds so far; what it raises ends the work."""
+"""Called about ten times a second with the phase and the seconds so far; what it raises ends the work."""
 
 
 @by_identity
@@ -92,11 +92,11 @@ def _order(edits: Edits, settings: Mapping[str, Any]) -> tuple[str, str]:
 _EXPECTED = "a tombolo.Mesh, a mesh of meshio or PyVista, a vtkDataSet, or coordinates with their cells"
 
 
-def _with_stage(progress: Optional[Progress], stage: Callable[[], str]) -> Optional[Callable[[float], object]]:
+def _with_phase(progress: Optional[Progress], phase: Callable[[], str]) -> Optional[Callable[[float], object]]:
     """What is called with the seconds alone."""
     if progress is None:
         return None
-    return lambda seconds: progress(stage(), seconds)
+    return lambda seconds: progress(phase(), seconds)
 
 
 class Shaper:
@@ -120,7 +120,7 @@ class Shaper:
     angle : float, optional
         Name the parts of the surface between edges of so many degrees or more, whatever parts the mesh names.
     progress : callable, optional
-        As of `shape`, while the mesh is read and its surface found; the stage is `"mesh"`.
+        As of `shape`, while the mesh is read and its surface found; the phase is `"mesh"`.
 
     Raises
     ------
@@ -171,14 +171,10 @@ class Shaper:
                 raise MeshError(f"found {what_it_is(mesh)}, expected {_EXPECTED}")
         elif isinstance(mesh, Mapping) and "points" not in mesh and len(mesh) != 1:
             raise MeshError(f"found {len(mesh)} meshes ({', '.join(map(str, mesh))}), expected one")
-        cells, faces = part(mesh, "cells"), part(mesh, "faces")
+        faces = part(mesh, "faces")
         check_faces(faces)
-        check_numbers("cells", cells)
-        check_numbers("faces", faces)
         make = functools.partial(_native.Shaper, mesh, degrees(angle))
-        self._shaper = in_thread(make, _with_stage(progress, lambda: "mesh"))
-        # What could not be read was refused by then.
-        check_room(part(mesh, "points"), cells)
+        self._shaper = in_thread(make, _with_phase(progress, lambda: "mesh"))
         if angle is None:
             check_found(faces, {feature["name"] for feature in self.features})
 
@@ -204,7 +200,7 @@ class Shaper:
         Parameters
         ----------
         progress : callable, optional
-            As of `shape`; the stage is `"skeleton"`.
+            As of `shape`; the phase is `"skeleton"`.
 
         Returns
         -------
@@ -276,7 +272,7 @@ class Shaper:
             The edits, or an order with its settings, or a JSON file of either. Lengths are in the unit of length of the
             mesh, angles in degrees.
         progress : callable, optional
-            ``progress(stage, seconds)`` is called at once, and then about ten times a second. The stage is `"surface"`,
+            ``progress(phase, seconds)`` is called at once, and then about ten times a second. The phase is `"surface"`,
             `"volume"` or `"guard"`, the check of the meshes on the way; it may come back where a mesh is mended.
         **settings : dict
             `deform`: how the volume follows; `guard`: what the mesh must keep to; `schedule`: in how many shapes the
@@ -352,11 +348,11 @@ class Shaper:
         self._shaper.cancel()
 
     def _work(
-        self, call: Callable[[], Result], progress: Optional[Progress], stage: Optional[Callable[[], str]] = None
+        self, call: Callable[[], Result], progress: Optional[Progress], phase: Optional[Callable[[], str]] = None
     ) -> Result:
         """A call that can be interrupted: it is given up before the mesh can be used again."""
         self._shaper.renew()
-        return in_thread(call, _with_stage(progress, stage or self._shaper.stage), self._shaper.cancel)
+        return in_thread(call, _with_phase(progress, phase or self._shaper.phase), self._shaper.cancel)
 
     def __repr__(self) -> str:
         return f"<tombolo.Shaper, features: {', '.join(feature['name'] for feature in self.features)}>"
