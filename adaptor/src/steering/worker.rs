@@ -351,3 +351,38 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
         .build()
         .map_err(std::io::Error::other)
 }
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::shape::Request;
+
+    use super::*;
+
+    #[test]
+    fn no_forecast_is_left_without_an_answer() {
+        let jobs = Jobs {
+            state: Mutex::default(),
+            changed: Condvar::new(),
+            cancellation: Cancellation::default(),
+        };
+        let (tell, told) = channel();
+        let ask = |asker: u64, name: &'static str| {
+            let tell = tell.clone();
+            let asked = PlanRequest { request: Request::new([], [[0.0; 3]].into()), own: None };
+            let answer = move |answer: Result<Forecast, &'static str>| {
+                tell.send((name, answer.err())).unwrap();
+            };
+            jobs.forecast(asker, asked, Box::new(answer));
+        };
+        ask(1, "first");
+        ask(2, "of another");
+        ask(1, "second");
+        assert_eq!(told.try_iter().collect::<Vec<_>>(), [("first", Some(OVERTAKEN))]);
+        jobs.close();
+        let mut left: Vec<_> = told.try_iter().collect();
+        left.sort_unstable();
+        assert_eq!(left, [("of another", Some(GONE)), ("second", Some(GONE))]);
+        ask(1, "too late");
+        assert_eq!(told.try_iter().collect::<Vec<_>>(), [("too late", Some(GONE))]);
+    }
+}

@@ -92,12 +92,14 @@ def test_polygons_in_vtk_form_are_the_same_cells_borrowed_and_copied():
     points = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((5, 5))], -1).reshape(-1, 3)
     numbers = np.arange(25).reshape(5, 5)
     quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], -1).reshape(-1, 4)
-    offsets = np.arange(0, quads.size + 1, 4)
+    offsets, kept = np.arange(0, quads.size + 1, 4), []
     pipelines = [{"name": "area", "stages": [{"surface": {}}, {"statistics": {"field": "height"}}]}]
     with tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": pipelines}) as adaptor:
         for cycle in range(6):
             types = np.full(len(quads), 7, np.uint8 if cycle < 3 else np.int64)
             cells = {"connectivity": quads.ravel().copy(), "offsets": offsets.copy(), "types": types}
+            # An array that is gone would leave its place in memory to the next.
+            kept.append(cells)
             shown = tombolo.Mesh(points, cells, {"height": points[:, 2].copy()})
             adaptor.execute(cycle, 0.1 * cycle, 0.1, {"plate": shown})
 

@@ -510,7 +510,7 @@ def test_truth_values_number_no_vertices():
         ((POINTS, {"tetra": TETS}, {"top": truth}), r"faces\['top'\]"),
         ((POINTS, {"tetra": TETS}, {"top": {"triangle": truth}}), r"faces\['top'\]\['triangle'\]"),
     ):
-        with pytest.raises(tombolo.MeshError, match=f"{what}: found an array of bool, expected vertex numbers"):
+        with pytest.raises(tombolo.MeshError, match=f"{what}: found an array of bool; expected vertex numbers"):
             tombolo.Shaper(*given)
 
 
