@@ -354,7 +354,7 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
 
 #[cfg(test)]
 mod tests {
-    use tombolo_deform::shape::Request;
+    use tombolo_deform::{mesh::Vector, shape::Request};
 
     use super::*;
 
@@ -368,7 +368,8 @@ mod tests {
         let (tell, told) = channel();
         let ask = |asker: u64, name: &'static str| {
             let tell = tell.clone();
-            let asked = PlanRequest { request: Request::new([], [[0.0; 3]].into()), own: None };
+            let request = Request::new([], Arc::<[Vector]>::from([[0.0; 3]]));
+            let asked = PlanRequest { request, own: None };
             let answer = move |answer: Result<Forecast, &'static str>| {
                 tell.send((name, answer.err())).unwrap();
             };
