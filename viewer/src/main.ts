@@ -2,6 +2,7 @@
 import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
 import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
+import { SentViews } from "./connection/sent-views";
 import { Stack } from "./connection/stack";
 import { watchDefects } from "./defects";
 import { part, write } from "./dom";
@@ -58,7 +59,6 @@ import { paint, save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
 import type { Bar } from "./picture/scene";
 import { Checker } from "./pipelines/checker";
-import type { CheckWorker } from "./pipelines/checker";
 import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
@@ -222,7 +222,7 @@ const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!,
   projection: () => scene.projection(), bounds: () => scene.bounds(), redraw: () => scene.redraw(),
   points: () => scene.layers.get(store.state.chosenView ?? "")?.coordinates ?? new Float32Array(0),
 }, slice);
-const earlier: Earlier = new Earlier(store, () => scene.layers.values(), () => {
+const earlier: Earlier = new Earlier(store, () => [...scene.layers.values()].filter(({ name }) => sentViews.has(name)), () => {
   compare.update();
   linePlot.update();
   histogramPlot.update();
@@ -284,7 +284,8 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
 const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
   history.choose(key);
   dock.choose(history);
-});
+}, () => sentViews.update());
+const sentViews: SentViews = new SentViews(store, () => pins.views, onlyView, (message) => commands.ask(message));
 watchPictureTools(part("scene"), part("stage"), {
   pin: (x, y) => {
     const probe = scene.probe(x, y);
@@ -303,7 +304,7 @@ pipelines.onChange(() => store.dispatch({ type: "pipelines known", pipelines: pi
 new PipelinesPanel(store, commands, () => scene.bounds());
 new PipelineEditorPanel(store, commands, {
   schema: () => loadJson(addresses.pipelineSchema), load: () => import("./pipelines/editor"),
-  checker: new Checker(() => new Worker(new URL("./pipelines/check.worker.ts", import.meta.url), { type: "module" }) as unknown as CheckWorker),
+  checker: new Checker(() => new Worker(new URL("./pipelines/check.worker.ts", import.meta.url), { type: "module" })),
 }, reveal);
 const bar = new StatusBar(store, commands);
 new WheelPanel(store, commands);
@@ -475,6 +476,7 @@ publish({
     return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
       bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,
       triangles: (layer.topology?.triangles.length ?? 0) / 3, topology: layer.topology?.topology ?? null,
+      cycle: own(store.state.frames.views, name)?.cycle ?? null,
     }]));
   },
   get orders() { return structuredClone(store.state.orders); },

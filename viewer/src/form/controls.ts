@@ -272,7 +272,7 @@ function listControl(field: Field & { kind: "list" }, naming: Naming, special: S
     write: (value) => {
       const values = Array.isArray(value) ? value : [];
       // The inputs stay what they are while they are written into: a hand may be on one of them.
-      if (values.length === entries.length) entries.forEach(({ control }, i) => control.write(values[i]!));
+      if (values.length === entries.length) entries.forEach(({ control }, i) => control.write(values[i]));
       else {
         entries = values.map(entry);
         show();

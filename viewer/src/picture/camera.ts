@@ -143,7 +143,7 @@ export class Camera {
     const [width, height] = this.canvas.getSize();
     let largest = 0;
     for (let corner = 0; corner < 8; corner++) {
-      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
+      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer);
       largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
     }
     if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));

@@ -22,22 +22,30 @@ export class Pins {
   private pins: Pin[] = [];
   private count = 0;
 
-  /** `describe` names the field that a reading is of, and its unit. */
+  /** `describe` names the field that a reading is of, and its unit; `changed` is called when there are other pins. */
   constructor(
     private readonly history: History, private readonly marks: Pick<Marks, "set">, private readonly source: PinSource,
     private readonly describe: (reading: ProbeReading) => { name: string; unit: string | null }, private readonly chosen: (key: string) => void,
+    private readonly changed: () => void,
   ) {}
+
+  /** The views in which there are pins. */
+  get views(): ReadonlySet<string> {
+    return new Set(this.pins.map(({ probe }) => probe.view));
+  }
 
   /** Pins a place, and has it plotted. The oldest goes where there are too many. */
   add(probe: Probe): void {
     const pin: Pin = { name: `probe ${++this.count}`, probe, point: null, sought: null, series: new Set() };
     if (this.pins.length >= PINS) this.remove(this.pins[0]!);
     this.pins.push(pin);
+    this.changed();
     this.update();
   }
 
   clear(): void {
     for (const pin of [...this.pins]) this.remove(pin);
+    this.changed();
     this.update();
   }
 

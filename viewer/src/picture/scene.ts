@@ -168,7 +168,7 @@ export class Scene {
   onPage(point: Vector): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
-    const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
+    const place = this.canvas.worldToDisplay(...point, this.renderer);
     return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
   }
 
@@ -288,8 +288,8 @@ export class Scene {
   /** The line through a place of the page, from the nearest depth of the picture to the farthest. */
   private ray(clientX: number, clientY: number): { origin: Vector; direction: Vector } {
     const [x, y] = this.onCanvas(clientX, clientY);
-    const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
-    const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
+    const near = this.canvas.displayToWorld(x, y, 0, this.renderer);
+    const far = this.canvas.displayToWorld(x, y, 1, this.renderer);
     return { origin: near, direction: [far[0] - near[0], far[1] - near[1], far[2] - near[2]] };
   }
 

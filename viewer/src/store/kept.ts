@@ -87,6 +87,6 @@ function readPage(storage: Pick<Storage, "getItem">): Page {
 function readRun(storage: Pick<Storage, "getItem">, key: string): Run {
   const { looks, dock } = read(storage, key);
   const { open, chosen } = (typeof dock === "object" && dock !== null ? dock : {}) as { open?: unknown; chosen?: unknown };
-  const names = Array.isArray(chosen) && chosen.every((name) => typeof name === "string") ? (chosen as string[]) : null;
+  const names = Array.isArray(chosen) && chosen.every((name) => typeof name === "string") ? chosen : null;
   return { looks: readLooks(looks), dock: { open: open !== false, chosen: names } };
 }

@@ -13,6 +13,7 @@ describe("a pinned place", () => {
   let marks: readonly Mark[];
   let pins: Pins;
   let sought: number;
+  let watched: string[][];
 
   /** A square that is cut into two triangles in one order or the other; the field is the place along x. */
   const square = (topology: string, cycle: number, isTurned: boolean, z = 0): typeof shown => ({
@@ -32,6 +33,7 @@ describe("a pinned place", () => {
     history = new History();
     marks = [];
     sought = 0;
+    watched = [];
     pins = new Pins(history, { set: (_, made) => { marks = made; } }, {
       read: (probe) => (shown ? readProbe(probe, shown.topology, shown.frame, { field: "x", component: -1 }) : null),
       near: (view, point) => {
@@ -39,7 +41,7 @@ describe("a pinned place", () => {
         return shown ? probeNear(view, point, shown.topology, shown.frame.points) : null;
       },
       topologyOf: () => shown && shown.topology.topology,
-    }, () => ({ name: "x", unit: null }), () => undefined);
+    }, () => ({ name: "x", unit: null }), () => undefined, () => watched.push([...pins.views]));
     shown = square("1", 1, false);
     pins.add({ view: "v", topology: "1", triangle: 0, weights: [0.5, 0.25, 0.25] });
   });
@@ -69,5 +71,7 @@ describe("a pinned place", () => {
     expect(marks).toMatchObject([{ label: "probe 1: the place is gone" }]);
     pins.clear();
     expect(marks).toEqual([]);
+    // Whoever chooses what the run sends hears of both.
+    expect(watched).toEqual([["v"], []]);
   });
 });
