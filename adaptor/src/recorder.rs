@@ -60,6 +60,7 @@ impl Recorder {
             orders: Some(orders),
             serves,
             keys: HashMap::new(),
+            is_incomplete: false,
         };
         let done = Arc::clone(&is_done);
         let work = move || {
@@ -101,11 +102,11 @@ impl Drop for Recorder {
     fn drop(&mut self) {
         // Where there was a server, its end has told how the run ends.
         let serves = self.encoder.is_none();
-        self.hub.end_observing(!serves);
         if let Some(encoder) = self.encoder.take() {
             self.hub.close();
             let _ = encoder.join();
         }
+        self.hub.end_observing(!serves);
         let until = Instant::now() + END;
         while !self.is_done.load(Ordering::Acquire) {
             if Instant::now() >= until {
@@ -134,6 +135,8 @@ struct Writing {
     serves: bool,
     /// By view, when its last key frame was written, and whether it was asked for another.
     keys: HashMap<usize, (Instant, bool)>,
+    /// Whether it was said that frames are left out.
+    is_incomplete: bool,
 }
 
 impl Writing {
@@ -172,12 +175,16 @@ impl Writing {
                     }
                 }
                 Some(Observed::Behind(view)) => self.hub.want_key(view, EXACT),
-                Some(Observed::End) => return self.out.flush().map_err(|error| error.to_string()),
+                Some(Observed::End) => {
+                    self.say_what_is_missing();
+                    return self.out.flush().map_err(|error| error.to_string());
+                }
                 Some(Observed::TooMuch) => {
                     return Err("the disk is too slow for what viewers are sent".into());
                 }
                 None => {
                     self.out.flush().map_err(|error| error.to_string())?;
+                    self.say_what_is_missing();
                     self.observer.wait(PERIOD);
                     if !self.serves {
                         self.hub.status();
@@ -185,6 +192,21 @@ impl Writing {
                 }
             }
         }
+    }
+
+    /// Says once, as soon as it is so, that frames are left out; the report counts them.
+    fn say_what_is_missing(&mut self) {
+        if self.is_incomplete || self.hub.counts().unrecorded == 0 {
+            return;
+        }
+        self.is_incomplete = true;
+        let (run, path) = (self.hub.run(), self.path.display());
+        tracing::warn!(
+            run,
+            %path,
+            "the recording {path} has not all frames: they come faster than they are encoded and \
+             written, and the solver does not wait; the report counts those that are missing"
+        );
     }
 
     fn put(&mut self, kind: Kind, view: u32, message: &[u8]) -> Result<(), String> {

@@ -113,6 +113,41 @@ fn a_run_that_was_interrupted_anywhere_ends_as_one_that_was_not() {
     }
 }
 
+/// The ordinary case: a file of orders gets one more, and the run is submitted again.
+#[test]
+fn an_order_that_is_added_to_the_file_repeats_none_of_those_before() {
+    const CYCLES: u64 = 30;
+    const SAVED: u64 = 12;
+    let order = |cycle: u64, by: f64| {
+        json!({"at": {"cycle": cycle}, "order": {"edits": [{"translate": {"features": ["z-max"],
+            "fixed": ["z-min"], "by": [0, 0, by]}}], "schedule": {"steps": 2}}})
+    };
+    let given = |output: &Path, orders: &Value| Settings {
+        orders: parse_orders(&orders.to_string(), "orders.json").unwrap(),
+        ..settings(output, false)
+    };
+    let first = json!({"parameter": {"name": "heating", "value": 1.25}});
+    let before = json!([first, order(4, -0.1), {"at": {"cycle": 14}, "stop": {}}]);
+    let after = json!([first, order(4, -0.1), order(18, -0.05)]);
+    let (mut whole, mut trace) = (Trace::new(), Trace::new());
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(given(output.path(), &after));
+    (0..CYCLES).for_each(|_| step(&mut solver, &mut whole));
+    let expected = solver.finish().orders;
+    let output = tempfile::tempdir().unwrap();
+    let mut solver = Solver::new(given(output.path(), &before));
+    (0..SAVED).for_each(|_| step(&mut solver, &mut trace));
+    let checkpoint = solver.adaptor.checkpoint();
+    let mesh = solver.mesh.clone();
+    drop(solver);
+    wait_for_lock(&output.path().join("journal.jsonl"));
+    let mut again = Solver::new(given(output.path(), &after).restart(checkpoint));
+    (again.mesh, again.cycle) = (mesh, SAVED);
+    (SAVED..CYCLES).for_each(|_| step(&mut again, &mut trace));
+    assert_same(&trace, &whole, 0, "the file has one order more");
+    assert_eq!(again.finish().orders.len(), expected.len());
+}
+
 fn random_message(random: &mut Rng, sent: u64) -> Value {
     let amount = 0.05 + 0.01 * random.u64(..25) as f64;
     let schedule = json!({"steps": 1 + random.u64(..5), "every": {"steps": 1 + random.u64(..4)}});

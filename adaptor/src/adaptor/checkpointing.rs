@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use tombolo_deform::communicator::{Alarm, Communicator, Writer};
-use tombolo_pipelines::language::{CheckpointNote, TimedCommand};
+use tombolo_pipelines::language::CheckpointNote;
 
 use super::{Adaptor, SteeredMesh};
 use crate::{
     checkpoint::{Checkpoint, CheckpointError, SavedCommand, SavedMesh, SavedRun, write_of_ranks},
-    fingerprint::hash,
     step::Moment,
 };
 
@@ -73,6 +72,7 @@ impl Adaptor {
             parameters: parameters.collect(),
             pipelines: [self.given.pipelines.clone(), self.config.pipelines.clone()],
             timed: (self.given.orders, self.timed.left().to_vec()),
+            given: self.timed.given().to_vec(),
             defaults: self.defaults.clone(),
             known: self.log.known(),
             waiting,
@@ -123,9 +123,4 @@ pub(super) struct Given {
     pub(super) pipelines: Vec<tombolo_pipelines::language::Pipeline>,
     /// A hash of the commands.
     pub(super) orders: u64,
-}
-
-/// A hash by which lists of commands are told apart.
-pub(super) fn hash_of(commands: &[TimedCommand]) -> u64 {
-    hash(serde_json::to_vec(commands).unwrap_or_default())
 }

@@ -519,6 +519,10 @@ impl CommandSink for Intake {
         self.queue.drive();
     }
 
+    fn left(&self, client: u64) {
+        self.forecaster.get().into_iter().for_each(|forecaster| forecaster.withdraw(client));
+    }
+
     fn orders(&self) -> Value {
         self.log.told()
     }

@@ -85,7 +85,8 @@ impl Continued {
         let is_first = communicator.rank() == 0;
         let journal = settings.config.journal.as_ref().map(|path| settings.output.join(path));
         let since = match journal.filter(|_| is_first && settings.replay.is_none()) {
-            Some(file) => read_since(&file, &checkpoint.run),
+            Some(file) => read_since(&file, &checkpoint.run)
+                .inspect(|since| warn_of_other_journal(&file, &checkpoint.run, since)),
             None => Ok(Since::default()),
         };
         let since = if communicator.size() == 1 { since? } else { agree(communicator, since)? };
@@ -172,13 +173,28 @@ fn read_since(file: &Path, run: &SavedRun) -> Result<Since, CheckpointError> {
     Since::read(journal, &restarted_from(run)).map_err(|reason| error(reason.to_string()))
 }
 
+/// Says so where the journal is that of other runs: the run goes on without what it does not tell.
+fn warn_of_other_journal(file: &Path, run: &SavedRun, since: &Since) {
+    if since.has_checkpoint {
+        return;
+    }
+    let (journal, cycle, id) = (file.display(), run.cycle, &run.run);
+    tracing::warn!(
+        run = id,
+        cycle,
+        "the journal {journal} does not tell of the checkpoint at cycle {cycle} of run {id}: orders and other commands \
+         that were accepted after it are not carried out; they are in the journal of that run, with \
+         which it would go on"
+    );
+}
+
 fn restarted_from(run: &SavedRun) -> RestartedFrom {
     RestartedFrom { run: run.run.clone(), checkpoint: run.id.clone(), cycle: run.cycle }
 }
 
 impl Again {
     fn of(run: &SavedRun, since: Since) -> Self {
-        let Since { commands, shapes, notes, until } = since;
+        let Since { commands, shapes, notes, until, .. } = since;
         let open = until.unwrap_or(0);
         let mut outcomes: HashMap<String, (usize, Taken)> =
             (0..).zip(commands).map(|(at, taken)| (taken.id.clone(), (at, taken))).collect();

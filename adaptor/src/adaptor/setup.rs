@@ -12,13 +12,8 @@ use tombolo_pipelines::language::{
 };
 
 use super::{
-    Adaptor, Meetings, SteeredMesh,
-    absence::Absence,
-    checkpointing::{Given, hash_of},
-    commands::Intake,
-    contract::Lent,
-    restarting::Continued,
-    timing::Timing,
+    Adaptor, Meetings, SteeredMesh, absence::Absence, checkpointing::Given, commands::Intake,
+    contract::Lent, restarting::Continued, timing::Timing,
 };
 use crate::{
     changes::Changes,
@@ -28,7 +23,9 @@ use crate::{
     recorder::Recorder,
     settings::Settings,
     stages::Pipelines,
-    steering::{Defaults, EditStack, Events, Log, Parameters, Queue, Timed},
+    steering::{
+        Defaults, EditStack, Events, Log, Parameters, Queue, Timed, hash_of, without_given,
+    },
     step::Moment,
     stream::{Clock, Hub, Server, warn_of_readable_token},
     watch::Watch,
@@ -66,16 +63,28 @@ impl Adaptor {
         let mut defaults = before.map_or_else(|| Defaults::of(&config), Defaults::from);
         let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
         let mut given = Given { pipelines: config.pipelines.clone(), orders: hash_of(&orders) };
-        let (mut orders, mut moment) = (orders, Moment::default());
+        let (mut orders, mut given_before) = (orders, Vec::new());
+        let mut moment = Moment::default();
         if let Some(Continued { checkpoint: Checkpoint { run: saved, .. }, .. }) = &continued {
             moment = Moment { cycle: saved.cycle, time: saved.time };
             if config.pipelines == saved.pipelines[1] {
                 given.pipelines.clone_from(&saved.pipelines[0]);
                 defaults.clone_from(&saved.defaults);
             }
-            // The commands of another file take the place of those that were to come.
-            if given.orders == saved.timed.0 {
-                orders.clone_from(&saved.timed.1);
+            // The commands of another file take the place of those that were to come; those that it
+            // had already are not carried out again.
+            let all = orders.len();
+            orders = match given.orders == saved.timed.0 {
+                true => saved.timed.1.clone(),
+                false => without_given(orders, &saved.given),
+            };
+            given_before.clone_from(&saved.given);
+            if first && given.orders != saved.timed.0 && orders.len() < all {
+                let (given, cycle) = (all - orders.len(), saved.cycle);
+                tracing::info!(
+                    run = &*run,
+                    "the orders are not those of the run before; {given} of them were carried out until cycle {cycle}, and are not again"
+                );
             }
             notes = continued.iter().flat_map(Continued::notes).cloned().collect();
             for (name, value) in &saved.parameters {
@@ -170,7 +179,7 @@ impl Adaptor {
             communicator,
             solvers,
             parameters,
-            timed: Timed::new(orders),
+            timed: Timed::new(orders, given_before),
             run,
             given,
             has_begun: continued.as_ref().is_some_and(|it| it.checkpoint.run.has_begun),

@@ -27,6 +27,7 @@ pub(crate) struct Options {
 pub(crate) fn play(options: &Options) -> Result<(), Failure> {
     let mut settings = StreamServer::default();
     settings.listen.clone_from(&options.listen);
+    crate::logging::start();
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let playback = Playback::start(&options.file, &settings)?;
     let directory = std::env::temp_dir();

@@ -58,6 +58,7 @@ pub(crate) fn relay(options: &Options) -> Result<(), Failure> {
     if let Some(connections) = options.connections {
         settings.connections = connections;
     }
+    crate::logging::start();
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     let mut relay = Relay::start(&settings)?;
     say(&relay.invitation(std::io::stdout().is_terminal())?)?;

@@ -49,6 +49,13 @@ impl Forecaster {
         }
     }
 
+    /// Lets go of what an asker wanted to know who is gone.
+    pub(crate) fn withdraw(&self, asker: u64) {
+        if let Planning::Beside(jobs) = &self.planning {
+            jobs.withdraw(asker);
+        }
+    }
+
     /// Has the ranks give up the shapes of an order that a command in the queue takes back: none of
     /// them can obey it before. On one process the next call obeys it while they are found.
     pub(crate) fn take_back(&self, order: &str) {

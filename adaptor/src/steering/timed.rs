@@ -1,21 +1,26 @@
 //! Commands that were given beforehand.
 
+use std::collections::HashMap;
+
 use tombolo_pipelines::language::{At, Command, Order, TimedCommand};
 
-use crate::step::Moment;
+use crate::{fingerprint::hash, step::Moment};
 
 /// Commands that are not due yet, in the order in which they were given.
 #[derive(Debug)]
 pub(crate) struct Timed {
     commands: Vec<TimedCommand>,
+    /// The hashes of those that were given, also by the run before.
+    given: Vec<u64>,
     /// The least of the cycles and of the times at which one is due.
     cycle: u64,
     time: f64,
 }
 
 impl Timed {
-    pub(crate) fn new(commands: Vec<TimedCommand>) -> Self {
-        let mut timed = Self { commands, cycle: u64::MAX, time: f64::INFINITY };
+    /// Commands to be given, after those of these hashes.
+    pub(crate) fn new(commands: Vec<TimedCommand>, given: Vec<u64>) -> Self {
+        let mut timed = Self { commands, given, cycle: u64::MAX, time: f64::INFINITY };
         timed.look_ahead();
         timed
     }
@@ -38,6 +43,11 @@ impl Timed {
     /// Those that were not given yet.
     pub(crate) fn left(&self) -> &[TimedCommand] {
         &self.commands
+    }
+
+    /// The hashes of those that were given.
+    pub(crate) fn given(&self) -> &[u64] {
+        &self.given
     }
 
     /// The next order, as far as that can be known.
@@ -81,9 +91,31 @@ impl Timed {
         };
         let (due, rest) = std::mem::take(&mut self.commands).into_iter().partition(has_come);
         self.commands = rest;
+        self.given.extend(due.iter().map(|command| hash_of(std::slice::from_ref(command))));
         self.look_ahead();
         due
     }
+}
+
+/// A hash by which lists of commands are told apart.
+pub(crate) fn hash_of(commands: &[TimedCommand]) -> u64 {
+    hash(serde_json::to_vec(commands).unwrap_or_default())
+}
+
+/// Those of a list of commands that were not given yet: one that is there twice is left once where it
+/// was given once.
+pub(crate) fn without_given(commands: Vec<TimedCommand>, given: &[u64]) -> Vec<TimedCommand> {
+    let mut counts = HashMap::<u64, usize>::new();
+    given.iter().for_each(|&hash| *counts.entry(hash).or_default() += 1);
+    let is_left =
+        |command: &TimedCommand| match counts.get_mut(&hash_of(std::slice::from_ref(command))) {
+            Some(count) if *count > 0 => {
+                *count -= 1;
+                false
+            }
+            _ => true,
+        };
+    commands.into_iter().filter(is_left).collect()
 }
 
 #[cfg(test)]
@@ -97,7 +129,7 @@ mod tests {
     #[test]
     fn each_command_is_given_once_when_its_moment_has_come() {
         let moments = [Some(At::Cycle(3)), None, Some(At::Time(0.5)), Some(At::Cycle(3))];
-        let mut timed = Timed::new(moments.map(at).to_vec());
+        let mut timed = Timed::new(moments.map(at).to_vec(), Vec::new());
         let mut given = Vec::new();
         for cycle in 0..20 {
             let moment = Moment { cycle, time: f64::from(cycle as u32) * 0.1 };
@@ -109,5 +141,16 @@ mod tests {
             [(0, None), (3, Some(At::Cycle(3))), (3, Some(At::Cycle(3))), (5, Some(At::Time(0.5)))]
         );
         assert!(timed.is_empty());
+        assert_eq!(timed.given().len(), 4);
+    }
+
+    #[test]
+    fn of_a_file_that_was_changed_what_was_given_is_not_given_again() {
+        let [early, late] = [at(Some(At::Cycle(3))), at(Some(At::Cycle(9)))];
+        let mut timed = Timed::new(vec![early.clone(), early.clone(), late.clone()], Vec::new());
+        timed.take_due(Moment { cycle: 5, time: 0.0 });
+        let new = at(None);
+        let changed = vec![early.clone(), new.clone(), early.clone(), early.clone(), late.clone()];
+        assert_eq!(without_given(changed, timed.given()), [new, early, late]);
     }
 }

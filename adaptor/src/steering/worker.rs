@@ -46,7 +46,11 @@ const END: Duration = Duration::from_secs(2);
 /// Takes the answer to a forecast, on the worker's thread, or why there is none, on any thread.
 pub(crate) type Answer = Box<dyn FnOnce(Result<Forecast, &'static str>) + Send>;
 
-/// Why a forecast is not answered that has not begun.
+/// After how long a forecast is given up once its asker wants to know something else. One that takes less
+/// is finished: whoever asks at every move of a handle hears of one after the other.
+const LONG: Duration = Duration::from_secs(2);
+
+/// Why a forecast is not answered.
 pub(crate) const OVERTAKEN: &str =
     "a later forecast of the same client has taken the place of this one";
 const GONE: &str = "the mesh whose shape could be changed is gone";
@@ -58,6 +62,24 @@ struct Question {
     answer: Answer,
 }
 
+/// The forecast that is being found.
+struct ForecastUnderWay {
+    asker: u64,
+    begun: Instant,
+    given_up: Option<GivenUp>,
+}
+
+/// Why a forecast is given up.
+#[derive(Clone, Copy)]
+enum GivenUp {
+    /// An order comes first: the forecast is begun anew after it.
+    Delayed,
+    /// Its asker wants to know something else.
+    Overtaken,
+    /// Its asker is gone.
+    Unwanted,
+}
+
 /// The jobs that wait, by how urgent they are.
 #[derive(Default)]
 struct WaitingJobs {
@@ -66,6 +88,7 @@ struct WaitingJobs {
     at_plan: Option<u64>,
     /// The newest of each asker.
     forecasts: VecDeque<Question>,
+    at_forecast: Option<ForecastUnderWay>,
     prepare: Option<Deformation>,
     ahead: Option<PlanRequest>,
     /// Whatever is asked for is given up.
@@ -110,8 +133,12 @@ impl Jobs {
                 .or_else(|| state.forecasts.pop_front().map(Job::Forecast))
                 .or_else(|| state.prepare.take().map(Job::Prepare))
                 .or_else(|| state.ahead.take().map(Job::Ahead));
-            if job.is_some() {
-                return job;
+            if let Some(job) = job {
+                if let Job::Forecast(Question { asker, .. }) = job {
+                    let begun = Instant::now();
+                    state.at_forecast = Some(ForecastUnderWay { asker, begun, given_up: None });
+                }
+                return Some(job);
             }
             state = wait(&self.changed, state);
         }
@@ -124,6 +151,55 @@ impl Jobs {
         if state.at_plan == Some(number) {
             self.cancellation.cancel();
         }
+    }
+
+    /// Has a plan of this number made, before all forecasts.
+    fn plan(&self, number: u64, asked: PlanRequest) {
+        self.change(|state| {
+            state.plans.push_back((number, asked));
+            self.give_forecast_up(state, GivenUp::Delayed, |_| true);
+        });
+    }
+
+    /// Gives up the forecast under way, if it is one of these.
+    fn give_forecast_up(
+        &self,
+        state: &mut WaitingJobs,
+        why: GivenUp,
+        is_meant: impl FnOnce(&ForecastUnderWay) -> bool,
+    ) {
+        if let Some(underway) = state.at_forecast.as_mut().filter(|it| is_meant(it)) {
+            underway.given_up = Some(why);
+            self.cancellation.cancel();
+        }
+    }
+
+    /// Lets go of the forecasts of an asker who is gone.
+    pub(crate) fn withdraw(&self, asker: u64) {
+        self.change(|state| {
+            state.forecasts.retain(|waiting| waiting.asker != asker);
+            self.give_forecast_up(state, GivenUp::Unwanted, |underway| underway.asker == asker);
+        });
+    }
+
+    /// Answers a question with what was found, unless it was given up.
+    fn answer(&self, question: Question, forecast: Forecast) {
+        // Told once the lock is free.
+        let (question, told) = {
+            let mut state = lock(&self.state);
+            let given_up = state.at_forecast.take().and_then(|underway| underway.given_up);
+            let is_overtaken = state.forecasts.iter().any(|it| it.asker == question.asker);
+            match given_up {
+                None => (question, Ok(forecast)),
+                Some(GivenUp::Delayed) if state.closed => (question, Err(GONE)),
+                Some(GivenUp::Delayed) if !is_overtaken => {
+                    return state.forecasts.push_front(question);
+                }
+                Some(GivenUp::Delayed | GivenUp::Overtaken) => (question, Err(OVERTAKEN)),
+                Some(GivenUp::Unwanted) => return,
+            }
+        };
+        (question.answer)(told);
     }
 
     /// Lets a plan go on that another thread makes while this one has no plan under way: what was
@@ -161,6 +237,9 @@ impl Jobs {
             let before = state.forecasts.iter().position(|waiting| waiting.asker == asker);
             let overtaken = before.and_then(|index| state.forecasts.remove(index));
             state.forecasts.push_back(question);
+            self.give_forecast_up(state, GivenUp::Overtaken, |underway| {
+                underway.asker == asker && underway.begun.elapsed() >= LONG
+            });
             overtaken.map(|overtaken| (overtaken, OVERTAKEN))
         });
         if let Some((Question { answer, .. }, why)) = unanswered {
@@ -244,7 +323,7 @@ impl Worker {
     /// Has a plan made; tells its number.
     pub(crate) fn plan(&mut self, asked: PlanRequest) -> u64 {
         self.plans += 1;
-        self.jobs.change(|state| state.plans.push_back((self.plans, asked)));
+        self.jobs.plan(self.plans, asked);
         self.plans
     }
 
@@ -314,9 +393,9 @@ fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queu
                 Done::Planned(number, Box::new(planner.plan(&asked)))
             }
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
-            Job::Forecast(Question { asked, answer, .. }) => {
-                let forecast = lock(planner).forecast(&asked);
-                answer(Ok(forecast));
+            Job::Forecast(question) => {
+                let forecast = lock(planner).forecast(&question.asked);
+                jobs.answer(question, forecast);
                 continue;
             }
             Job::Ahead(asked) => {
@@ -354,36 +433,101 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
 
 #[cfg(test)]
 mod tests {
-    use tombolo_deform::{mesh::Vector, shape::Request};
+    use tombolo_deform::{
+        mesh::Vector,
+        shape::{Request, ShapeSeconds},
+    };
 
     use super::*;
 
+    type Told = Receiver<(&'static str, Option<&'static str>)>;
+    type Tell = Sender<(&'static str, Option<&'static str>)>;
+
+    fn jobs() -> (Jobs, Tell, Told) {
+        let cancellation = Cancellation::default();
+        let jobs = Jobs { state: Mutex::default(), changed: Condvar::new(), cancellation };
+        let (tell, told) = channel();
+        (jobs, tell, told)
+    }
+
+    fn request() -> PlanRequest {
+        let request = Request::new([], Arc::<[Vector]>::from([[0.0; 3]]));
+        PlanRequest { request, own: None }
+    }
+
+    /// Asks for a forecast; what is told of it is its name, and why it is not answered.
+    fn ask(jobs: &Jobs, tell: &Tell, asker: u64, name: &'static str) {
+        let tell = tell.clone();
+        let answer = move |answer: Result<Forecast, &'static str>| {
+            tell.send((name, answer.err())).unwrap();
+        };
+        jobs.forecast(asker, request(), Box::new(answer));
+    }
+
+    /// Takes the next job, which is a forecast.
+    fn begin(jobs: &Jobs) -> Question {
+        match jobs.next() {
+            Some(Job::Forecast(question)) => question,
+            _ => panic!("no forecast is next"),
+        }
+    }
+
+    fn end(jobs: &Jobs, question: Question) {
+        let found = Forecast::rejected("found".into(), None, None, ShapeSeconds::default());
+        jobs.answer(question, found);
+    }
+
     #[test]
     fn no_forecast_is_left_without_an_answer() {
-        let jobs = Jobs {
-            state: Mutex::default(),
-            changed: Condvar::new(),
-            cancellation: Cancellation::default(),
-        };
-        let (tell, told) = channel();
-        let ask = |asker: u64, name: &'static str| {
-            let tell = tell.clone();
-            let request = Request::new([], Arc::<[Vector]>::from([[0.0; 3]]));
-            let asked = PlanRequest { request, own: None };
-            let answer = move |answer: Result<Forecast, &'static str>| {
-                tell.send((name, answer.err())).unwrap();
-            };
-            jobs.forecast(asker, asked, Box::new(answer));
-        };
-        ask(1, "first");
-        ask(2, "of another");
-        ask(1, "second");
+        let (jobs, tell, told) = jobs();
+        ask(&jobs, &tell, 1, "first");
+        ask(&jobs, &tell, 2, "of another");
+        ask(&jobs, &tell, 1, "second");
         assert_eq!(told.try_iter().collect::<Vec<_>>(), [("first", Some(OVERTAKEN))]);
         jobs.close();
         let mut left: Vec<_> = told.try_iter().collect();
         left.sort_unstable();
         assert_eq!(left, [("of another", Some(GONE)), ("second", Some(GONE))]);
-        ask(1, "too late");
+        ask(&jobs, &tell, 1, "too late");
         assert_eq!(told.try_iter().collect::<Vec<_>>(), [("too late", Some(GONE))]);
+    }
+
+    #[test]
+    fn a_forecast_makes_way_for_an_order_and_is_found_after_it() {
+        let (jobs, tell, told) = jobs();
+        ask(&jobs, &tell, 1, "forecast");
+        let question = begin(&jobs);
+        jobs.plan(1, request());
+        assert!(jobs.cancellation.is_cancelled());
+        end(&jobs, question);
+        assert!(matches!(jobs.next(), Some(Job::Plan(1, _))));
+        assert!(!jobs.cancellation.is_cancelled());
+        end(&jobs, begin(&jobs));
+        assert_eq!(told.try_iter().collect::<Vec<_>>(), [("forecast", None)]);
+    }
+
+    #[test]
+    fn a_forecast_is_given_up_once_nobody_waits_for_it() {
+        let (jobs, tell, told) = jobs();
+        ask(&jobs, &tell, 1, "of one who goes");
+        let question = begin(&jobs);
+        jobs.withdraw(2);
+        assert!(!jobs.cancellation.is_cancelled());
+        jobs.withdraw(1);
+        assert!(jobs.cancellation.is_cancelled());
+        end(&jobs, question);
+        // One that takes its time, and one that does not.
+        for (ago, is_given_up) in [(LONG, true), (Duration::ZERO, false)] {
+            ask(&jobs, &tell, 1, "before");
+            let question = begin(&jobs);
+            let earlier = Instant::now().checked_sub(ago).unwrap();
+            lock(&jobs.state).at_forecast.as_mut().unwrap().begun = earlier;
+            ask(&jobs, &tell, 1, "after");
+            assert_eq!(jobs.cancellation.is_cancelled(), is_given_up);
+            end(&jobs, question);
+            end(&jobs, begin(&jobs));
+            let why = is_given_up.then_some(OVERTAKEN);
+            assert_eq!(told.try_iter().collect::<Vec<_>>(), [("before", why), ("after", None)]);
+        }
     }
 }

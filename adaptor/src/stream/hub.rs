@@ -39,6 +39,8 @@ use crate::{
 
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
+/// How long frames are encoded after the end of the run.
+const LAST_FRAMES: Duration = Duration::from_secs(2);
 
 /// Encodes a frame on the encoder's thread at one of the [`LEVELS`], as a key frame or as the next of
 /// its chain; the message says why it could not be done.
@@ -96,6 +98,7 @@ impl Clock {
 struct Counters {
     frames: AtomicU64,
     dropped: AtomicU64,
+    unrecorded: AtomicU64,
     bytes: AtomicU64,
     raw_bytes: AtomicU64,
 }
@@ -144,7 +147,8 @@ pub(super) struct HubState {
     /// The seconds of a step, as they were measured last.
     pub(super) step_seconds: Option<f64>,
     end: End,
-    closed: bool,
+    /// Since when nothing new comes.
+    closed: Option<Instant>,
 }
 
 /// The newest messages of the solver, for all viewers.
@@ -311,6 +315,8 @@ impl Hub {
         let known = state.views.entry(view).or_insert_with(named);
         if known.waiting.replace(encode).is_some() && is_watched {
             self.counters.dropped.fetch_add(1, Ordering::Relaxed);
+            let recordings = u64::from(state.observer.is_some());
+            self.counters.unrecorded.fetch_add(recordings, Ordering::Relaxed);
         }
         if is_watched {
             self.work.notify_one();
@@ -335,6 +341,7 @@ impl Hub {
         StreamCounts {
             frames: get(&self.counters.frames),
             dropped: get(&self.counters.dropped),
+            unrecorded: get(&self.counters.unrecorded),
             bytes: get(&self.counters.bytes),
             raw_bytes: get(&self.counters.raw_bytes),
         }
@@ -347,24 +354,25 @@ impl Hub {
 
     /// Whether the end has begun.
     pub(super) fn is_closed(&self) -> bool {
-        lock(&self.state).closed
+        lock(&self.state).closed.is_some()
     }
 
-    /// Ends the encoder's thread.
+    /// Ends the encoder's thread, once the last frames are encoded.
     pub(crate) fn close(&self) {
-        lock(&self.state).closed = true;
+        lock(&self.state).closed = Some(Instant::now());
         self.work.notify_all();
     }
 }
 
 /// Done on the encoder's thread.
 impl Hub {
-    /// Encodes what waits, as long as anybody looks, until the hub is closed.
+    /// Encodes what waits, as long as anybody looks, until the hub is closed; what waits then too, for
+    /// two seconds.
     pub(crate) fn encode_until_closed(&self) {
         loop {
             let mut state = lock(&self.state);
             let (view, encode, level, key) = loop {
-                if state.closed {
+                if state.closed.is_some_and(|since| since.elapsed() >= LAST_FRAMES) {
                     return;
                 }
                 let HubState { views, clients, observer, .. } = &mut *state;
@@ -377,6 +385,7 @@ impl Hub {
                 });
                 match waiting {
                     Some(found) => break found,
+                    None if state.closed.is_some() => return,
                     None => state = wait(&self.work, state),
                 }
             };
@@ -401,6 +410,9 @@ impl Hub {
         for client in state.audience() {
             let missed = client.frame(view, name, frame) as u64;
             self.counters.dropped.fetch_add(missed, Ordering::Relaxed);
+            if state.observer.as_ref().is_some_and(|observer| Arc::ptr_eq(observer, client)) {
+                self.counters.unrecorded.fetch_add(missed, Ordering::Relaxed);
+            }
         }
     }
 }

@@ -304,7 +304,7 @@ pub(super) fn fragment(sha256: Option<&str>) -> String {
 
 /// Warns of a server that listens on every address of the machine: what is reachable then, and what its
 /// links name.
-pub(super) fn warn_of_open(run: Option<&str>, address: SocketAddr) {
+pub(super) fn warn_of_open(run: Option<&str>, address: SocketAddr, setting: &str) {
     if !address.ip().is_unspecified() {
         return;
     }
@@ -314,7 +314,7 @@ pub(super) fn warn_of_open(run: Option<&str>, address: SocketAddr) {
         %address,
         "viewers are listened to on every address of this machine, from every network that it is in: whoever reaches {address} \
          can connect, and needs a secret to see anything. The links lead to {named}, which may be known by that name to \
-         this machine alone; `stream.listen` takes one address"
+         this machine alone; {setting} takes one address"
     );
 }
 

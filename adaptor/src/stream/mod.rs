@@ -114,6 +114,9 @@ pub(crate) trait CommandSink: Send + Sync {
     /// Hears that a viewer has connected which may steer.
     fn driven(&self);
 
+    /// Hears that a viewer has left.
+    fn left(&self, _client: u64) {}
+
     /// Is called a few times a second, for what may take only so long.
     fn look_at_time(&self) {}
 
@@ -135,6 +138,8 @@ pub struct StreamCounts {
     /// Frames that made way for newer ones before a viewer had read them or the encoder had come to
     /// them.
     pub dropped: u64,
+    /// Frames that are not in the recording, because the encoder or the disk did not keep up.
+    pub unrecorded: u64,
     /// Bytes of all frames sent.
     pub bytes: u64,
     /// Bytes that the values in them fill uncompressed.
@@ -189,7 +194,8 @@ pub(crate) struct Server {
     links: Arc<Links>,
     hub: Arc<Hub>,
     stop: Option<oneshot::Sender<()>>,
-    threads: Vec<JoinHandle<()>>,
+    serving: Option<JoinHandle<()>>,
+    encoding: Option<JoinHandle<()>>,
 }
 
 /// The state that every request is answered from.
@@ -245,7 +251,8 @@ impl Server {
         };
         let (socket, place) = settings.place().map(bind).transpose()?.unzip();
         if let Some(Place::Address(address)) = &place {
-            links::warn_of_open(hub.run(), *address);
+            let setting = if playback.is_some() { "--listen" } else { "`stream.listen`" };
+            links::warn_of_open(hub.run(), *address, setting);
         }
         let identity = match &place {
             Some(place) => Identity::of_server(settings, place)?,
@@ -292,12 +299,14 @@ impl Server {
             .build()
             .map_err(StreamError::Thread)?;
         let mut server =
-            Self { links, hub: Arc::clone(&hub), stop: Some(stop), threads: Vec::new() };
+            Self { links, hub: Arc::clone(&hub), stop: Some(stop), serving: None, encoding: None };
         let thread = |name: &str| std::thread::Builder::new().name(name.into());
         let serving = move || serve_until_stopped(runtime, &ways, &shared, stopped);
-        server.threads.push(thread("tombolo-stream").spawn(serving).map_err(StreamError::Thread)?);
+        let serving = thread("tombolo-stream").spawn(serving);
+        server.serving = Some(serving.map_err(StreamError::Thread)?);
         let encoding = move || while went_wrong("encoder", || hub.encode_until_closed()) {};
-        server.threads.push(thread("tombolo-encode").spawn(encoding).map_err(StreamError::Thread)?);
+        let encoding = thread("tombolo-encode").spawn(encoding);
+        server.encoding = Some(encoding.map_err(StreamError::Thread)?);
         Ok(server)
     }
 
@@ -334,13 +343,17 @@ impl Server {
 }
 
 impl Drop for Server {
+    /// The last frames come before the word of the end.
     fn drop(&mut self) {
         self.hub.close();
+        if let Some(encoding) = self.encoding.take() {
+            let _ = encoding.join();
+        }
         if let Some(stop) = self.stop.take() {
             let _ = stop.send(());
         }
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
+        if let Some(serving) = self.serving.take() {
+            let _ = serving.join();
         }
     }
 }

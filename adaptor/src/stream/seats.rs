@@ -78,12 +78,11 @@ impl Hub {
         lock(&self.state).wheel.silence = silence;
     }
 
-    /// Lets a viewer go.
-    pub(super) fn leave(&self, client: &Arc<Client>) {
+    /// Lets a viewer go, unless it has come back by another connection; whether it is gone.
+    pub(super) fn leave(&self, client: &Arc<Client>) -> bool {
         let mut state = lock(&self.state);
-        // It may have come back by another connection.
         if !state.clients.get(&client.id).is_some_and(|seated| Arc::ptr_eq(seated, client)) {
-            return;
+            return false;
         }
         state.clients.remove(&client.id);
         self.note_audience(&state);
@@ -97,6 +96,7 @@ impl Hub {
         state.wheel.left.push_back((client.id, client.back.clone(), client.access));
         state.status_dirty = true;
         state.together.left(client.id);
+        true
     }
 
     /// Takes note that a viewer ends its connection by itself: the wheel is not kept for it.

@@ -103,7 +103,9 @@ impl Seat<'_> {
 impl Drop for Seat<'_> {
     fn drop(&mut self) {
         self.note(ViewerMove::Left);
-        self.hub.leave(self.client);
+        if self.hub.leave(self.client) {
+            self.commands.left(self.client.id);
+        }
     }
 }
 

@@ -37,7 +37,7 @@ struct Arguments {
     #[arg(long, value_name = "ORDERS.json")]
     orders: Option<PathBuf>,
     /// Carry the newest run of a journal out again: the same shapes at the same cycles, to the bit
-    #[arg(long, value_name = "JOURNAL.jsonl", conflicts_with = "orders")]
+    #[arg(long, value_name = "JOURNAL.jsonl", conflicts_with_all = ["orders", "restart"])]
     replay: Option<PathBuf>,
     /// How many steps to take; without it the case's when headless, else until stopped
     #[arg(long, value_name = "N")]
@@ -58,7 +58,8 @@ struct Arguments {
     /// Where viewers connect to, in place of what the pipelines say; port 0 takes any free one
     #[arg(long, value_name = "ADDRESS:PORT|unix:/PATH", conflicts_with = "headless")]
     listen: Option<Listen>,
-    /// Save the state of the run every so many steps, and at the end
+    /// Save the state of the run every so many steps, and at the end; a run that is stopped takes the step
+    /// under way to its end, and saves that
     #[arg(long, value_name = "N")]
     checkpoint_every: Option<NonZeroU64>,
     /// The file of the state; without it flow.state in the folder of the output

@@ -281,7 +281,14 @@ impl Run {
         })
     }
 
+    /// Takes the steps.
     fn advance(&mut self, begun: Instant) -> Result<(), ProgramError> {
+        if let (Some(steps), cycle @ 1..) = (self.steps, self.solver.cycle())
+            && steps <= cycle
+            && self.communicator.rank() == 0
+        {
+            tell(format_args!("the state is at cycle {cycle}: {steps} steps leave nothing to do"));
+        }
         let time_step = self.case.time_step;
         let (mut velocity, mut pressure) = (self.solver.velocity(), self.solver.pressure());
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {

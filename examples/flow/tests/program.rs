@@ -104,7 +104,7 @@ fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
     for key in ["surface", "volume", "guard"] {
         assert!(json["orders"][0]["seconds"][key].is_number());
     }
-    for key in ["frames", "dropped", "bytes", "raw_bytes"] {
+    for key in ["frames", "dropped", "unrecorded", "bytes", "raw_bytes"] {
         assert!(json["stream"][key].is_number());
     }
     assert!(report.flow.mass_in > 0.1);

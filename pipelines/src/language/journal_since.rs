@@ -27,6 +27,9 @@ pub struct Since {
     pub notes: Vec<PinnedNote>,
     /// The last cycle of which the journal tells what the solver did.
     pub until: Option<u64>,
+    /// Whether the journal tells of the checkpoint. Where it does not, what was accepted after that is not
+    /// known.
+    pub has_checkpoint: bool,
 }
 
 /// A command that was accepted.
@@ -309,7 +312,7 @@ impl Reader {
         let History { settled, shapes, until } = self.history;
         let names = settled.into_iter().map(|(id, _)| id).chain(self.accepted);
         let commands = names.filter_map(|id| self.taken.remove(&id)).collect();
-        Since { commands, shapes, notes: self.notes, until }
+        Since { commands, shapes, notes: self.notes, until, has_checkpoint: self.has_checkpoint }
     }
 }
 
@@ -350,7 +353,7 @@ mod tests {
                 ("p", Outcome::Open {}),
             ]
         );
-        assert_eq!((since.shapes.len(), since.until), (1, Some(5)));
+        assert_eq!((since.shapes.len(), since.until, since.has_checkpoint), (1, Some(5), true));
         assert_eq!(read(JOURNAL, "r2").unwrap(), Since::default());
     }
 
@@ -360,6 +363,7 @@ mod tests {
         let since = read(&JOURNAL[..cut], "r1").unwrap();
         let ids: Vec<_> = since.commands.iter().map(|taken| &*taken.id).collect();
         assert_eq!((ids, since.shapes.len(), since.until), (vec!["open"], 0, None));
+        assert!(!since.has_checkpoint);
     }
 
     #[test]

@@ -114,6 +114,9 @@ fn advice(error: &ClientError, link: &Link) -> String {
         ClientError::Unknown { .. } => {
             "Look at the spelling of the host. A node of a cluster is often known inside it alone: go through an SSH tunnel then.".into()
         }
+        ClientError::Refused { .. } if link.socket_path().is_some() => {
+            "The run has ended, and has left its socket behind.".into()
+        }
         ClientError::Refused { .. } => format!(
             "The run has ended, or it listens on another port, or the SSH tunnel is not open. A run on another machine that listens \
              on its loopback address is reached by: ssh -L {port}:127.0.0.1:{port} HOST"
@@ -159,7 +162,7 @@ fn advice(error: &ClientError, link: &Link) -> String {
         }
         ClientError::NotTombolo { .. } => format!(
             "Another program has the port {port}, or the tunnel ends at another port than that of the run, or the run is of another \
-             version of Tombolo. Look at what the run has printed."
+             version of Tombolo, or it has been suspended. Look at what the run has printed, and whether its job runs."
         ),
         _ => "Try again; if it stays so, look at what the run has printed.".into(),
     }

@@ -22,6 +22,8 @@ use clap::Args;
 use super::{ANSWER, NOT_YET, Target, WAIT, failed, refused, steer};
 use crate::program::{Failure, read, say};
 
+/// How long a forecast is waited for without a word.
+const LONG: Duration = Duration::from_secs(5);
 /// How long the bar is, in characters.
 const BAR: usize = 30;
 
@@ -101,8 +103,12 @@ pub(crate) fn forecast(options: &ForecastOptions) -> Result<(), Failure> {
     let client = steer(&options.target)?;
     let order = with_displacements(order, &client)?;
     let id = client.forecast(&order).map_err(failed)?;
+    let (asked, mut has_told) = (Instant::now(), false);
     loop {
         let told = next(&client, WAIT)?;
+        if asked.elapsed() > LONG && !std::mem::replace(&mut has_told, true) {
+            eprintln!("tombolo: not found yet; the shapes of orders come before forecasts");
+        }
         match &told.event {
             Event::Forecast(forecast) if forecast.id.as_ref() == Some(&id) => {
                 if options.target.json {

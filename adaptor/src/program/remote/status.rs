@@ -1,5 +1,7 @@
 //! `tombolo status`.
 
+use serde_json::{Value, json};
+
 use crate::client::{Client, Drives, Event, Hello, Status};
 
 use super::{ANSWER, Target, connect, failed};
@@ -12,7 +14,9 @@ pub(crate) fn status(target: &Target) -> Result<(), Failure> {
             return Err(Failure::Wrong("the run tells nothing".into()));
         };
         match told.event {
-            Event::Status(_) if target.json => return say(&told.text),
+            Event::Status(_) if target.json => {
+                return say(whole(&told.text, client.hello().as_deref()));
+            }
             Event::Status(status) => {
                 say(line(&status, is_recording(&client)))?;
                 return client.hello().map_or(Ok(()), |hello| describe(&hello));
@@ -20,6 +24,16 @@ pub(crate) fn status(target: &Target) -> Result<(), Failure> {
             _ => {}
         }
     }
+}
+
+/// The message of a status, with the parameters and orders of the run beside it.
+fn whole(status: &str, hello: Option<&Hello>) -> Value {
+    let mut whole: Value = serde_json::from_str(status).unwrap_or_default();
+    if let (Some(whole), Some(Hello { parameters, orders, .. })) = (whole.as_object_mut(), hello) {
+        whole.insert("parameters".into(), json!(parameters));
+        whole.insert("orders".into(), json!(orders));
+    }
+    whole
 }
 
 /// Whether a recording is shown, and no run.
@@ -73,6 +87,17 @@ fn describe(hello: &Hello) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_status_as_json_has_parameters_and_orders_beside_it() {
+        let hello = r#"{"protocol": 2, "client": "c1", "role": "watcher",
+            "parameters": [{"name": "inflow", "value": 1.0, "minimum": 0.0, "maximum": 2.0}]}"#;
+        let hello: Hello = serde_json::from_str(hello).expect("a hello");
+        let told = whole(r#"{"status": {"cycle": 7}}"#, Some(&hello));
+        assert_eq!(told["status"], json!({"cycle": 7}));
+        assert_eq!(told["parameters"][0]["name"], "inflow");
+        assert_eq!(told["orders"], json!([]));
+    }
 
     #[test]
     fn a_line_counts_the_others_and_shows_no_digits_of_rounding() {

@@ -143,7 +143,10 @@ fn find(path: &Path, file: File) -> Result<Found, TargetError> {
         if let Some(path) = told_in(&line) {
             told = Some(path.into());
         }
-        let is_link = |word: &&str| BEGINNINGS.iter().any(|begin| word.starts_with(begin));
+        // Without a secret it is the address of something that is written of.
+        let is_link = |word: &&str| {
+            word.contains('?') && BEGINNINGS.iter().any(|begin| word.starts_with(begin))
+        };
         for word in line.split_whitespace().filter(is_link) {
             match word.parse() {
                 Ok(link) => return Ok(Found::Link(link)),
@@ -197,7 +200,8 @@ mod tests {
         let (log, path) = (at("near.log"), at("tombolo 7070.link"));
         assert_eq!(read("near.log"), Err(TargetError::Ended { log, path: path.clone() }));
         assert_eq!(read("tombolo 7070.link"), Err(TargetError::Gone { path }));
-        give(&at("other.txt"), "nothing here, in /tmp/x.link neither", 0o644);
+        let other = "the relay at https://127.0.0.1:1 is not reached, in /tmp/x.link neither";
+        give(&at("other.txt"), other, 0o644);
         assert_eq!(read("other.txt"), Err(TargetError::NoLink { path: at("other.txt") }));
         for (text, reason) in [
             ("127.0.0.1:7070", "it does not begin with http://"),

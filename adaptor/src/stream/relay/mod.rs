@@ -178,6 +178,7 @@ impl Relay {
         let credentials = Arc::new(credentials);
         let failed = |source| RelayError::Listen { address: settings.listen, source };
         let (socket, address) = Socket::bind_address(settings.listen).map_err(failed)?;
+        super::links::warn_of_open(None, address, "--listen");
         let is_open = !address.ip().is_loopback();
         let identity = match &settings.tls {
             Some(tls) => Some(Identity::of(tls, names_of(address))?),
