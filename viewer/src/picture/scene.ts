@@ -12,7 +12,7 @@ import { Layer } from "./layer";
 import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
-import type { Box } from "./camera";
+import type { Box, Covered } from "./camera";
 import { Detail } from "./detail";
 import { mouse } from "./mouse";
 import { Pace } from "./pace";
@@ -40,6 +40,8 @@ export interface SceneEvents {
   /** After each picture, with the directions of the axes on the screen. */
   drawn(axes: [number, number][]): void;
   trouble(message: string): void;
+  /** The room that is left for what lies over the picture; none where this is missing. */
+  covered?(): Covered;
   /** Whether the browser has taken away what draws. */
   lost(isLost: boolean): void;
 }
@@ -85,7 +87,7 @@ export class Scene {
     this.pace = new Pace(byProcessor, () => this.fit());
     this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => {
       if (!this.isPlacing) this.request();
-    }, () => this.pace.move());
+    }, () => this.pace.move(), events.covered);
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
     this.canvas.setContainer(container);
