@@ -182,9 +182,8 @@ fn warn_of_other_journal(file: &Path, run: &SavedRun, since: &Since) {
     tracing::warn!(
         run = id,
         cycle,
-        "the journal {journal} does not tell of the checkpoint at cycle {cycle} of run {id}: orders and other commands \
-         that were accepted after it are not carried out; they are in the journal of that run, with \
-         which it would go on"
+        "the journal {journal} does not tell of the checkpoint at cycle {cycle} of run {id}: what was accepted after \
+         it, if anything, is not carried out; it would be in the journal of that run"
     );
 }
 

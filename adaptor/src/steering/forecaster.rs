@@ -65,7 +65,8 @@ impl Forecaster {
     }
 
     /// Has `answer` called with what `order` would come to, were it given now, or with why that is
-    /// not found out. A question of the same `asker` that has not begun is forgotten, and told so.
+    /// not found out. A question of the same `asker` is forgotten, and told so, where it has not
+    /// begun or takes more than two seconds.
     pub(crate) fn ask(
         &self,
         asker: u64,

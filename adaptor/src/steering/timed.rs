@@ -102,8 +102,8 @@ pub(crate) fn hash_of(commands: &[TimedCommand]) -> u64 {
     hash(serde_json::to_vec(commands).unwrap_or_default())
 }
 
-/// Those of a list of commands that were not given yet: one that is there twice is left once where it
-/// was given once.
+/// Those of a list of commands that were not given yet. Of two that are alike, one is left if one was
+/// given.
 pub(crate) fn without_given(commands: Vec<TimedCommand>, given: &[u64]) -> Vec<TimedCommand> {
     let mut counts = HashMap::<u64, usize>::new();
     given.iter().for_each(|&hash| *counts.entry(hash).or_default() += 1);

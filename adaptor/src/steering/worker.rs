@@ -62,10 +62,12 @@ struct Question {
     answer: Answer,
 }
 
-/// The forecast that is being found.
+/// The forecast that is next or being found.
 struct ForecastUnderWay {
     asker: u64,
-    begun: Instant,
+    asked: PlanRequest,
+    /// Since when the kernel is at it: before that another thread may have the kernel.
+    begun: Option<Instant>,
     given_up: Option<GivenUp>,
 }
 
@@ -134,9 +136,10 @@ impl Jobs {
                 .or_else(|| state.prepare.take().map(Job::Prepare))
                 .or_else(|| state.ahead.take().map(Job::Ahead));
             if let Some(job) = job {
-                if let Job::Forecast(Question { asker, .. }) = job {
-                    let begun = Instant::now();
-                    state.at_forecast = Some(ForecastUnderWay { asker, begun, given_up: None });
+                if let Job::Forecast(Question { asker, asked, .. }) = &job {
+                    let (asker, asked) = (*asker, asked.clone());
+                    let underway = ForecastUnderWay { asker, asked, begun: None, given_up: None };
+                    state.at_forecast = Some(underway);
                 }
                 return Some(job);
             }
@@ -153,12 +156,36 @@ impl Jobs {
         }
     }
 
-    /// Has a plan of this number made, before all forecasts.
+    /// Has a plan of this number made, before all forecasts but the one under way whose shape it takes.
     fn plan(&self, number: u64, asked: PlanRequest) {
         self.change(|state| {
+            self.give_forecast_up(state, GivenUp::Delayed, |underway| {
+                underway.given_up.is_none() && !underway.asked.is(&asked)
+            });
             state.plans.push_back((number, asked));
-            self.give_forecast_up(state, GivenUp::Delayed, |_| true);
         });
+    }
+
+    /// Notes that the kernel is at the forecast from now on; whether it is still wanted. Whoever calls it has
+    /// the planner.
+    fn begin_forecast(&self) -> bool {
+        let mut state = lock(&self.state);
+        if !state.gives_up {
+            self.cancellation.renew();
+        }
+        match &mut state.at_forecast {
+            Some(underway) if underway.given_up.is_none() => {
+                underway.begun = Some(Instant::now());
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Notes that the kernel is at the forecast no more; why it was given up, if it was. Whoever calls it has
+    /// the planner.
+    fn end_forecast(&self) -> Option<GivenUp> {
+        lock(&self.state).at_forecast.take().and_then(|underway| underway.given_up)
     }
 
     /// Gives up the forecast under way, if it is one of these.
@@ -170,7 +197,9 @@ impl Jobs {
     ) {
         if let Some(underway) = state.at_forecast.as_mut().filter(|it| is_meant(it)) {
             underway.given_up = Some(why);
-            self.cancellation.cancel();
+            if underway.begun.is_some() {
+                self.cancellation.cancel();
+            }
         }
     }
 
@@ -183,20 +212,19 @@ impl Jobs {
     }
 
     /// Answers a question with what was found, unless it was given up.
-    fn answer(&self, question: Question, forecast: Forecast) {
+    fn answer(&self, question: Question, found: Result<Forecast, GivenUp>) {
         // Told once the lock is free.
         let (question, told) = {
             let mut state = lock(&self.state);
-            let given_up = state.at_forecast.take().and_then(|underway| underway.given_up);
             let is_overtaken = state.forecasts.iter().any(|it| it.asker == question.asker);
-            match given_up {
-                None => (question, Ok(forecast)),
-                Some(GivenUp::Delayed) if state.closed => (question, Err(GONE)),
-                Some(GivenUp::Delayed) if !is_overtaken => {
+            match found {
+                Ok(forecast) => (question, Ok(forecast)),
+                Err(GivenUp::Delayed) if state.closed => (question, Err(GONE)),
+                Err(GivenUp::Delayed) if !is_overtaken => {
                     return state.forecasts.push_front(question);
                 }
-                Some(GivenUp::Delayed | GivenUp::Overtaken) => (question, Err(OVERTAKEN)),
-                Some(GivenUp::Unwanted) => return,
+                Err(GivenUp::Delayed | GivenUp::Overtaken) => (question, Err(OVERTAKEN)),
+                Err(GivenUp::Unwanted) => return,
             }
         };
         (question.answer)(told);
@@ -238,7 +266,8 @@ impl Jobs {
             let overtaken = before.and_then(|index| state.forecasts.remove(index));
             state.forecasts.push_back(question);
             self.give_forecast_up(state, GivenUp::Overtaken, |underway| {
-                underway.asker == asker && underway.begun.elapsed() >= LONG
+                underway.asker == asker
+                    && underway.begun.is_some_and(|begun| begun.elapsed() >= LONG)
             });
             overtaken.map(|overtaken| (overtaken, OVERTAKEN))
         });
@@ -394,8 +423,15 @@ fn work(jobs: &Jobs, planner: &Mutex<Planner>, tell: &Sender<Done>, queue: &Queu
             }
             Job::Prepare(deform) => Done::Prepared(Box::new(prepare(planner, &deform))),
             Job::Forecast(question) => {
-                let forecast = lock(planner).forecast(&question.asked);
-                jobs.answer(question, forecast);
+                let found = {
+                    let mut planner = lock(planner);
+                    let forecast = jobs.begin_forecast().then(|| planner.forecast(&question.asked));
+                    match (forecast, jobs.end_forecast()) {
+                        (Some(forecast), None) => Ok(forecast),
+                        (_, given_up) => Err(given_up.unwrap_or(GivenUp::Delayed)),
+                    }
+                };
+                jobs.answer(question, found);
                 continue;
             }
             Job::Ahead(asked) => {
@@ -433,6 +469,8 @@ fn pool(name: &'static str, threads: usize) -> std::io::Result<ThreadPool> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::LazyLock;
+
     use tombolo_deform::{
         mesh::Vector,
         shape::{Request, ShapeSeconds},
@@ -450,8 +488,15 @@ mod tests {
         (jobs, tell, told)
     }
 
+    /// One shape, always the same.
     fn request() -> PlanRequest {
-        let request = Request::new([], Arc::<[Vector]>::from([[0.0; 3]]));
+        static START: LazyLock<Arc<[Vector]>> = LazyLock::new(|| Arc::from([[0.0; 3]]));
+        PlanRequest { request: Request::new([], Arc::clone(&START)), own: None }
+    }
+
+    /// Another shape than that of [`request`].
+    fn other() -> PlanRequest {
+        let request = Request::new([], Arc::<[Vector]>::from([[1.0; 3]]));
         PlanRequest { request, own: None }
     }
 
@@ -467,14 +512,17 @@ mod tests {
     /// Takes the next job, which is a forecast.
     fn begin(jobs: &Jobs) -> Question {
         match jobs.next() {
-            Some(Job::Forecast(question)) => question,
+            Some(Job::Forecast(question)) => {
+                assert!(jobs.begin_forecast());
+                question
+            }
             _ => panic!("no forecast is next"),
         }
     }
 
     fn end(jobs: &Jobs, question: Question) {
         let found = Forecast::rejected("found".into(), None, None, ShapeSeconds::default());
-        jobs.answer(question, found);
+        jobs.answer(question, jobs.end_forecast().map_or(Ok(found), Err));
     }
 
     #[test]
@@ -497,10 +545,14 @@ mod tests {
         let (jobs, tell, told) = jobs();
         ask(&jobs, &tell, 1, "forecast");
         let question = begin(&jobs);
+        // One for the same shape takes what is found.
         jobs.plan(1, request());
+        assert!(!jobs.cancellation.is_cancelled());
+        jobs.plan(2, other());
         assert!(jobs.cancellation.is_cancelled());
         end(&jobs, question);
         assert!(matches!(jobs.next(), Some(Job::Plan(1, _))));
+        assert!(matches!(jobs.next(), Some(Job::Plan(2, _))));
         assert!(!jobs.cancellation.is_cancelled());
         end(&jobs, begin(&jobs));
         assert_eq!(told.try_iter().collect::<Vec<_>>(), [("forecast", None)]);
@@ -515,13 +567,22 @@ mod tests {
         assert!(!jobs.cancellation.is_cancelled());
         jobs.withdraw(1);
         assert!(jobs.cancellation.is_cancelled());
+        // An order that comes then does not bring it back.
+        jobs.plan(1, request());
         end(&jobs, question);
+        assert!(matches!(jobs.next(), Some(Job::Plan(1, _))));
+        // While another thread makes a plan, the forecast has not begun: that plan is not given up for it.
+        ask(&jobs, &tell, 1, "of one who goes too");
+        let Some(Job::Forecast(_)) = jobs.next() else { panic!("no forecast is next") };
+        jobs.withdraw(1);
+        assert!(!jobs.cancellation.is_cancelled() && !jobs.begin_forecast());
+        jobs.end_forecast();
         // One that takes its time, and one that does not.
         for (ago, is_given_up) in [(LONG, true), (Duration::ZERO, false)] {
             ask(&jobs, &tell, 1, "before");
             let question = begin(&jobs);
             let earlier = Instant::now().checked_sub(ago).unwrap();
-            lock(&jobs.state).at_forecast.as_mut().unwrap().begun = earlier;
+            lock(&jobs.state).at_forecast.as_mut().unwrap().begun = Some(earlier);
             ask(&jobs, &tell, 1, "after");
             assert_eq!(jobs.cancellation.is_cancelled(), is_given_up);
             end(&jobs, question);

@@ -2,6 +2,7 @@
 import { own } from "../own";
 import type { ClientMessage } from "./protocol";
 import type { Action } from "../store/actions";
+import { LINE, WORST } from "../store/pipelines";
 import type { State } from "../store/state";
 import { sameJson, sameParts } from "../store/store";
 import type { Store } from "../store/store";
@@ -9,6 +10,9 @@ import type { Store } from "../store/store";
 /** The most names in one message, and the most bytes of it, as the server takes them. */
 const MOST_NAMES = 256;
 const MOST_BYTES = 16384;
+
+/** Of these views panels tell whether or not they are in the picture: they are made by this page, and small. */
+const PANELS: ReadonlySet<string> = new Set([LINE, WORST]);
 
 type Source = Pick<State, "hello" | "looks" | "chosenView">;
 
@@ -19,7 +23,7 @@ type Source = Pick<State, "hello" | "looks" | "chosenView">;
 export function wantedViews({ hello, looks, chosenView }: Source, pinned: ReadonlySet<string>, only: string | null): readonly string[] | null {
   if (only !== null) return [only];
   const views = hello?.views ?? [];
-  const wanted = views.filter(({ name, kind }) => own(looks, name)?.visible !== false || name === chosenView || kind === "surface" || pinned.has(name));
+  const wanted = views.filter(({ name, kind }) => own(looks, name)?.visible !== false || name === chosenView || PANELS.has(name) || kind === "surface" || pinned.has(name));
   const names = wanted.map(({ name }) => name);
   return names.length === views.length || !fits(names) ? null : names;
 }

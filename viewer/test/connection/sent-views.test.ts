@@ -41,6 +41,13 @@ describe("the views that the run sends", () => {
     expect(told()).toEqual([{ names: ["surface", "lines"] }]);
   });
 
+  it("hold what panels are made of, also where it is not in the picture", () => {
+    const { told, see } = setUp({ views: [...VIEWS, { name: "line", kind: "probe" }, { name: "worst cells", kind: "threshold" }] });
+    see("line", false);
+    see("worst cells", false);
+    expect(told()).toEqual([]);
+  });
+
   it("hold those with a pin", () => {
     const { views, pinned, told, see } = setUp();
     pinned.add("lines");
