@@ -7,13 +7,9 @@ import { digits } from "../number";
 /** The most values that are shown. */
 const ROWS = 100;
 
-interface Row { row: HTMLElement; shown: HTMLElement; value: number | null }
-
 /** The newest values of each monitor. */
 export class MonitorPanel {
-  private readonly rows = new Map<string, Row>();
-  /** The units of those whose unit is known. */
-  private units: ReadonlyMap<string, string> = new Map();
+  private readonly rows = new Map<string, { row: HTMLElement; shown: HTMLElement }>();
 
   constructor(private readonly root: HTMLElement) {}
 
@@ -24,12 +20,11 @@ export class MonitorPanel {
       if (!known) {
         if (this.rows.size >= ROWS) continue;
         const shown = element("output", {});
-        known = { shown, value, row: element("div", { class: "monitor", title: `pipeline ${monitor.pipeline}` }, element("span", {}, name), shown) };
+        known = { shown, row: element("div", { class: "monitor", title: `pipeline ${monitor.pipeline}` }, element("span", {}, name), shown) };
         this.rows.set(key, known);
         this.root.append(known.row);
       }
-      known.value = value;
-      this.say(key, known);
+      write(known.shown, digits(value, 4));
     }
     this.hide();
   }
@@ -37,21 +32,12 @@ export class MonitorPanel {
   /** The monitors that there are now: a value of another one will never be a new one again. */
   keep(monitors: readonly MonitorInformation[]): void {
     const now = new Set(monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
-    this.units = new Map(monitors.flatMap(({ pipeline, name, unit }): [string, string][] => (unit ? [[seriesKey(pipeline, name), unit]] : [])));
-    for (const [key, known] of this.rows) {
-      if (now.has(key)) {
-        this.say(key, known);
-        continue;
-      }
-      known.row.remove();
+    for (const [key, { row }] of this.rows) {
+      if (now.has(key)) continue;
+      row.remove();
       this.rows.delete(key);
     }
     this.hide();
-  }
-
-  private say(key: string, { shown, value }: Row): void {
-    const unit = value === null ? undefined : this.units.get(key);
-    write(shown, `${digits(value, 4)}${unit === undefined ? "" : `\u00a0${unit}`}`);
   }
 
   private hide(): void {

@@ -12,7 +12,7 @@ import { Layer } from "./layer";
 import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
-import type { Box, Covered } from "./camera";
+import type { Box } from "./camera";
 import { Detail } from "./detail";
 import { mouse } from "./mouse";
 import { Pace } from "./pace";
@@ -40,8 +40,6 @@ export interface SceneEvents {
   /** After each picture, with the directions of the axes on the screen. */
   drawn(axes: [number, number][]): void;
   trouble(message: string): void;
-  /** The room that is left for what lies over the picture; none where this is missing. */
-  covered?(): Covered;
   /** Whether the browser has taken away what draws. */
   lost(isLost: boolean): void;
 }
@@ -87,7 +85,7 @@ export class Scene {
     this.pace = new Pace(byProcessor, () => this.fit());
     this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => {
       if (!this.isPlacing) this.request();
-    }, () => this.pace.move(), events.covered);
+    }, () => this.pace.move());
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
     this.canvas.setContainer(container);
@@ -170,7 +168,7 @@ export class Scene {
   onPage(point: Vector): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
-    const place = this.canvas.worldToDisplay(...point, this.renderer);
+    const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
     return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
   }
 
@@ -290,8 +288,8 @@ export class Scene {
   /** The line through a place of the page, from the nearest depth of the picture to the farthest. */
   private ray(clientX: number, clientY: number): { origin: Vector; direction: Vector } {
     const [x, y] = this.onCanvas(clientX, clientY);
-    const near = this.canvas.displayToWorld(x, y, 0, this.renderer);
-    const far = this.canvas.displayToWorld(x, y, 1, this.renderer);
+    const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
+    const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
     return { origin: near, direction: [far[0] - near[0], far[1] - near[1], far[2] - near[2]] };
   }
 

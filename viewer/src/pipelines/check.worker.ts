@@ -18,14 +18,10 @@ async function loaded(): Promise<Language> {
   }
 }
 
-async function answer(question: PipelineQuestion): Promise<CheckAnswer> {
+worker.onmessage = async ({ data }) => {
   try {
-    return (await loaded()).checkPipeline(question);
+    worker.postMessage((await loaded()).checkPipeline(data));
   } catch (error) {
-    return { failure: error instanceof Error ? error.message : String(error) };
+    worker.postMessage({ failure: error instanceof Error ? error.message : String(error) });
   }
-}
-
-worker.onmessage = ({ data }) => {
-  void answer(data).then((told) => worker.postMessage(told));
 };

@@ -72,7 +72,7 @@ export class Commands {
     return this.ask({ parameter: { name, value } });
   }
 
-  askToSteer(): string | null {
-    return this.send({ drive: {} });
+  askToSteer(): void {
+    this.send({ drive: {} });
   }
 }
