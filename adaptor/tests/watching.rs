@@ -144,7 +144,7 @@ fn a_recording_has_the_frames_though_nobody_watches() {
     solver.steps(50);
     let report = solver.finish();
     assert_eq!(report.pipelines[0].runs, 50);
-    // What came faster than it could be encoded is counted.
+    // A frame is in the recording, or it is counted as missing.
     let mut recording = Recording::open(output.path().join("run.tombolo")).unwrap();
     let (mut decoder, mut cycles) = (Decoder::new(), BTreeSet::new());
     while let Some(recorded) = recording.read_next().unwrap() {

@@ -72,7 +72,7 @@ impl Adaptor {
             parameters: parameters.collect(),
             pipelines: [self.given.pipelines.clone(), self.config.pipelines.clone()],
             timed: (self.given.orders, self.timed.left().to_vec()),
-            given: self.timed.given().to_vec(),
+            carried_out: self.timed.carried_out().to_vec(),
             defaults: self.defaults.clone(),
             known: self.log.known(),
             waiting,

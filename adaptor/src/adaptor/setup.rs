@@ -24,7 +24,7 @@ use crate::{
     settings::Settings,
     stages::Pipelines,
     steering::{
-        Defaults, EditStack, Events, Log, Parameters, Queue, Timed, hash_of, without_given,
+        Defaults, EditStack, Events, Log, Parameters, Queue, Timed, hash_of, without_carried_out,
     },
     step::Moment,
     stream::{Clock, Hub, Server, warn_of_readable_token},
@@ -63,7 +63,7 @@ impl Adaptor {
         let mut defaults = before.map_or_else(|| Defaults::of(&config), Defaults::from);
         let known: Vec<String> = known.into_iter().map(str::to_owned).collect();
         let mut given = Given { pipelines: config.pipelines.clone(), orders: hash_of(&orders) };
-        let (mut orders, mut given_before) = (orders, Vec::new());
+        let (mut orders, mut carried_out) = (orders, Vec::new());
         let mut moment = Moment::default();
         if let Some(Continued { checkpoint: Checkpoint { run: saved, .. }, .. }) = &continued {
             moment = Moment { cycle: saved.cycle, time: saved.time };
@@ -71,20 +71,22 @@ impl Adaptor {
                 given.pipelines.clone_from(&saved.pipelines[0]);
                 defaults.clone_from(&saved.defaults);
             }
-            // The commands of another file take the place of those that were to come; those that it
-            // had already are not carried out again.
-            let all = orders.len();
-            orders = match given.orders == saved.timed.0 {
-                true => saved.timed.1.clone(),
-                false => without_given(orders, &saved.given),
-            };
-            given_before.clone_from(&saved.given);
-            if first && given.orders != saved.timed.0 && orders.len() < all {
-                let (given, cycle) = (all - orders.len(), saved.cycle);
-                tracing::info!(
-                    run = &*run,
-                    "the orders are not those of the run before; {given} of them were carried out until cycle {cycle}, and are not again"
-                );
+            carried_out.clone_from(&saved.carried_out);
+            if given.orders == saved.timed.0 {
+                orders.clone_from(&saved.timed.1);
+            } else {
+                // The commands of another file take the place of those that were to come.
+                let all = orders.len();
+                orders = without_carried_out(orders, &carried_out);
+                let count = all - orders.len();
+                if first && count > 0 {
+                    tracing::info!(
+                        run = &*run,
+                        "the file of orders is another one than before; {count} of its commands were carried out until \
+                         cycle {}, and are not carried out again",
+                        saved.cycle
+                    );
+                }
             }
             notes = continued.iter().flat_map(Continued::notes).cloned().collect();
             for (name, value) in &saved.parameters {
@@ -179,7 +181,7 @@ impl Adaptor {
             communicator,
             solvers,
             parameters,
-            timed: Timed::new(orders, given_before),
+            timed: Timed::new(orders, carried_out),
             run,
             given,
             has_begun: continued.as_ref().is_some_and(|it| it.checkpoint.run.has_begun),

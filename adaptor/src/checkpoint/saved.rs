@@ -27,9 +27,9 @@ pub(crate) struct SavedRun {
     pub(crate) pipelines: [Vec<Pipeline>; 2],
     /// What the commands of files were told apart by, and those that are still to come.
     pub(crate) timed: (u64, Vec<TimedCommand>),
-    /// The hashes of the commands of files that were given.
+    /// The hashes of the commands of files that were carried out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub(crate) given: Vec<u64>,
+    pub(crate) carried_out: Vec<u64>,
     pub(crate) defaults: Defaults,
     /// The commands so far; on rank 0.
     pub(crate) known: KnownCommands,

@@ -49,7 +49,7 @@ impl Forecaster {
         }
     }
 
-    /// Lets go of what an asker wanted to know who is gone.
+    /// Gives up the forecasts of an asker who is gone.
     pub(crate) fn withdraw(&self, asker: u64) {
         if let Planning::Beside(jobs) = &self.planning {
             jobs.withdraw(asker);

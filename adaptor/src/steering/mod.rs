@@ -51,7 +51,7 @@ pub(crate) use room::Reservation;
 pub(crate) use source::Source;
 pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
-pub(crate) use timed::{Timed, hash_of, without_given};
+pub(crate) use timed::{Timed, hash_of, without_carried_out};
 pub(crate) use together::taken_back;
 pub(crate) use worker::OVERTAKEN;
 

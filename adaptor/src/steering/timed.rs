@@ -10,17 +10,17 @@ use crate::{fingerprint::hash, step::Moment};
 #[derive(Debug)]
 pub(crate) struct Timed {
     commands: Vec<TimedCommand>,
-    /// The hashes of those that were given, also by the run before.
-    given: Vec<u64>,
+    /// The hashes of those that were taken, also in the run before.
+    carried_out: Vec<u64>,
     /// The least of the cycles and of the times at which one is due.
     cycle: u64,
     time: f64,
 }
 
 impl Timed {
-    /// Commands to be given, after those of these hashes.
-    pub(crate) fn new(commands: Vec<TimedCommand>, given: Vec<u64>) -> Self {
-        let mut timed = Self { commands, given, cycle: u64::MAX, time: f64::INFINITY };
+    /// Commands that are not due yet; `carried_out` are the hashes of those that were.
+    pub(crate) fn new(commands: Vec<TimedCommand>, carried_out: Vec<u64>) -> Self {
+        let mut timed = Self { commands, carried_out, cycle: u64::MAX, time: f64::INFINITY };
         timed.look_ahead();
         timed
     }
@@ -45,9 +45,9 @@ impl Timed {
         &self.commands
     }
 
-    /// The hashes of those that were given.
-    pub(crate) fn given(&self) -> &[u64] {
-        &self.given
+    /// The hashes of those that were taken.
+    pub(crate) fn carried_out(&self) -> &[u64] {
+        &self.carried_out
     }
 
     /// The next order, as far as that can be known.
@@ -91,7 +91,7 @@ impl Timed {
         };
         let (due, rest) = std::mem::take(&mut self.commands).into_iter().partition(has_come);
         self.commands = rest;
-        self.given.extend(due.iter().map(|command| hash_of(std::slice::from_ref(command))));
+        self.carried_out.extend(due.iter().map(|command| hash_of(std::slice::from_ref(command))));
         self.look_ahead();
         due
     }
@@ -102,11 +102,14 @@ pub(crate) fn hash_of(commands: &[TimedCommand]) -> u64 {
     hash(serde_json::to_vec(commands).unwrap_or_default())
 }
 
-/// Those of a list of commands that were not given yet. Of two that are alike, one is left if one was
-/// given.
-pub(crate) fn without_given(commands: Vec<TimedCommand>, given: &[u64]) -> Vec<TimedCommand> {
+/// The commands of a file without those that a run has carried out. Where the file has two that are alike
+/// and one was carried out, the other stays.
+pub(crate) fn without_carried_out(
+    commands: Vec<TimedCommand>,
+    carried_out: &[u64],
+) -> Vec<TimedCommand> {
     let mut counts = HashMap::<u64, usize>::new();
-    given.iter().for_each(|&hash| *counts.entry(hash).or_default() += 1);
+    carried_out.iter().for_each(|&hash| *counts.entry(hash).or_default() += 1);
     let is_left =
         |command: &TimedCommand| match counts.get_mut(&hash_of(std::slice::from_ref(command))) {
             Some(count) if *count > 0 => {
@@ -141,7 +144,7 @@ mod tests {
             [(0, None), (3, Some(At::Cycle(3))), (3, Some(At::Cycle(3))), (5, Some(At::Time(0.5)))]
         );
         assert!(timed.is_empty());
-        assert_eq!(timed.given().len(), 4);
+        assert_eq!(timed.carried_out().len(), 4);
     }
 
     #[test]
@@ -151,6 +154,6 @@ mod tests {
         timed.take_due(Moment { cycle: 5, time: 0.0 });
         let new = at(None);
         let changed = vec![early.clone(), new.clone(), early.clone(), early.clone(), late.clone()];
-        assert_eq!(without_given(changed, timed.given()), [new, early, late]);
+        assert_eq!(without_carried_out(changed, timed.carried_out()), [new, early, late]);
     }
 }

@@ -32,15 +32,10 @@ use super::{
     together::Together,
     wheel::Wheel,
 };
-use crate::{
-    lock::{lock, wait},
-    step::Moment,
-};
+use crate::{lock::lock, step::Moment};
 
 /// How often it is looked for a viewer that is waited for.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// How long frames are encoded after the end of the run.
-const LAST_FRAMES: Duration = Duration::from_secs(2);
 
 /// Encodes a frame on the encoder's thread at one of the [`LEVELS`], as a key frame or as the next of
 /// its chain; the message says why it could not be done.
@@ -95,25 +90,26 @@ impl Clock {
 
 /// Counted as it happens, for the report.
 #[derive(Debug, Default)]
-struct Counters {
+pub(super) struct Counters {
     frames: AtomicU64,
-    dropped: AtomicU64,
-    unrecorded: AtomicU64,
+    pub(super) dropped: AtomicU64,
+    pub(super) unrecorded: AtomicU64,
     bytes: AtomicU64,
     raw_bytes: AtomicU64,
 }
 
+/// A view, and what the encoder has to make of it.
 #[derive(Default)]
-struct View {
-    name: Arc<str>,
+pub(super) struct View {
+    pub(super) name: Arc<str>,
     /// The extract that is newer than the last frame.
-    waiting: Option<Encode>,
+    pub(super) waiting: Option<Encode>,
     /// The extract of the last frame.
-    newest: Option<Encode>,
+    pub(super) newest: Option<Encode>,
     /// The levels at which it is still to be encoded.
-    pending: [bool; LEVELS],
+    pub(super) pending: [bool; LEVELS],
     /// The levels at which somebody cannot go on without a key frame.
-    key_wanted: [bool; LEVELS],
+    pub(super) key_wanted: [bool; LEVELS],
 }
 
 /// The answer to a viewer that connects.
@@ -129,7 +125,7 @@ pub(super) struct HubState {
     stack: ReportedStack,
     pub(super) conditions: Map<String, Value>,
     /// By their numbers, which no later view gets again.
-    views: BTreeMap<usize, View>,
+    pub(super) views: BTreeMap<usize, View>,
     pipelines: Option<Arc<[Pipeline]>>,
     surface: Option<Arc<ReferenceSurface>>,
     pub(super) clients: BTreeMap<u64, Arc<Client>>,
@@ -148,16 +144,16 @@ pub(super) struct HubState {
     pub(super) step_seconds: Option<f64>,
     end: End,
     /// Since when nothing new comes.
-    closed: Option<Instant>,
+    pub(super) closed: Option<Instant>,
 }
 
 /// The newest messages of the solver, for all viewers.
 #[derive(Default)]
 pub(crate) struct Hub {
     pub(super) state: Mutex<HubState>,
-    work: Condvar,
+    pub(super) work: Condvar,
     pub(crate) clock: Arc<Clock>,
-    counters: Counters,
+    pub(super) counters: Counters,
     arrivals: AtomicU64,
     /// The bits of the [`Audience`].
     audience: AtomicU64,
@@ -361,85 +357,6 @@ impl Hub {
     pub(crate) fn close(&self) {
         lock(&self.state).closed = Some(Instant::now());
         self.work.notify_all();
-    }
-}
-
-/// Done on the encoder's thread.
-impl Hub {
-    /// Encodes what waits, as long as anybody looks, until the hub is closed; what waits then too, for
-    /// two seconds.
-    pub(crate) fn encode_until_closed(&self) {
-        loop {
-            let mut state = lock(&self.state);
-            let (view, encode, level, key) = loop {
-                if state.closed.is_some_and(|since| since.elapsed() >= LAST_FRAMES) {
-                    return;
-                }
-                let HubState { views, clients, observer, .. } = &mut *state;
-                let audience = || clients.values().chain(&*observer);
-                let mut views = views.iter_mut().filter(|(_, view)| view.has_work());
-                let waiting = views.find_map(|(&number, view)| {
-                    let name = Arc::clone(&view.name);
-                    let mut looking = audience().filter(|client| client.looks_at(&name)).peekable();
-                    looking.peek().is_some().then(|| view.due(number, looking)).flatten()
-                });
-                match waiting {
-                    Some(found) => break found,
-                    None if state.closed.is_some() => return,
-                    None => state = wait(&self.work, state),
-                }
-            };
-            drop(state);
-            // A frame that cannot be encoded must not take the others with it.
-            let encoded =
-                std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| encode(level, key)))
-                    .unwrap_or_else(|_| Err("the encoder failed".into()));
-            match encoded {
-                Ok(encoded) => self.publish(view, &Arc::new(Frame::new(encoded, level))),
-                Err(reason) => self.tell(
-                    move || json!({"error": {"message": format!("a frame was not encoded: {reason}")}}),
-                ),
-            }
-        }
-    }
-
-    fn publish(&self, view: usize, frame: &Arc<Frame>) {
-        let state = lock(&self.state);
-        // It may have been let go of while it was encoded.
-        let Some(name) = state.views.get(&view).map(|view| &view.name) else { return };
-        for client in state.audience() {
-            let missed = client.frame(view, name, frame) as u64;
-            self.counters.dropped.fetch_add(missed, Ordering::Relaxed);
-            if state.observer.as_ref().is_some_and(|observer| Arc::ptr_eq(observer, client)) {
-                self.counters.unrecorded.fetch_add(missed, Ordering::Relaxed);
-            }
-        }
-    }
-}
-
-impl View {
-    /// Whether there is anything to encode, should somebody look at it.
-    fn has_work(&self) -> bool {
-        self.waiting.is_some() || self.pending.contains(&true) || self.key_wanted.contains(&true)
-    }
-
-    /// The next frame to encode, its level of precision, and whether it is a key frame.
-    fn due<'a>(
-        &mut self,
-        index: usize,
-        audience: impl Iterator<Item = &'a Arc<Client>>,
-    ) -> Option<(usize, Encode, usize, bool)> {
-        // Each extract is encoded at every level that somebody is at, so that none is left out.
-        if !self.pending.contains(&true)
-            && let Some(waiting) = self.waiting.take()
-        {
-            self.newest = Some(waiting);
-            audience.for_each(|client| self.pending[client.level(index)] = true);
-        }
-        let level = (0..LEVELS).find(|&level| self.pending[level] || self.key_wanted[level])?;
-        self.pending[level] = false;
-        let key = std::mem::take(&mut self.key_wanted[level]);
-        self.newest.clone().map(|encode| (index, encode, level, key))
     }
 }
 

@@ -26,6 +26,7 @@ mod allowance;
 mod connect;
 mod connection;
 mod credentials;
+mod encoding;
 mod gate;
 mod hub;
 mod links;
