@@ -86,7 +86,27 @@ const steps = [
     await until("a picture again", () => window.tombolo?.frames > 0);
     check((await page.evaluate(() => document.documentElement.dataset.theme)) === "light", "the theme was forgotten");
     check(await page.evaluate(() => [...document.querySelectorAll("#look select")].some((select) => select.value === "fixed")), "the range was forgotten");
+    // The pin is looked for anew; as long as there is one, its view is sent.
+    await until("the pin again", () => document.querySelectorAll("#marks circle.probe").length === 1);
+    await until("what it had read", () => [...document.querySelectorAll("#dock .choices label")].some((name) => /^probe 1: velocity magnitude/.test(name.textContent)));
     await picture("light");
+    await page.locator("#scene").press("Shift+P");
+    await until("no pin", () => document.querySelectorAll("#marks circle.probe").length === 0);
+  }],
+  ["a view that is hidden is not sent, and comes back when it is shown", async () => {
+    const cycles = () => page.evaluate(() => Object.fromEntries(Object.entries(window.tombolo.views).map(([name, { cycle }]) => [name, cycle])));
+    const shown = page.locator('[data-view="midplane"] input[type=checkbox]');
+    await shown.uncheck();
+    await page.click('[data-view="surface"] .choose');
+    // A frame may have been on its way.
+    const asked = (await cycles()).surface;
+    await until("frames of the surface", (cycle) => window.tombolo.views.surface.cycle >= cycle + 10, asked);
+    const before = await cycles();
+    await until("more frames of the surface", (cycle) => window.tombolo.views.surface.cycle >= cycle + 20, before.surface);
+    check((await cycles()).midplane === before.midplane, `the hidden view went on from ${before.midplane} to ${(await cycles()).midplane}`);
+    await shown.check();
+    await until("the view again", (cycle) => window.tombolo.views.midplane.cycle > cycle, before.midplane);
+    await page.click('[data-view="midplane"] .choose');
   }],
   ["nobody is kept out, in light and in dark", async () => {
     for (const theme of ["light", "dark"]) {

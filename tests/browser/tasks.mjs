@@ -46,6 +46,20 @@ const steps = [
     }
     check(await page.isHidden("#tour"), "the tour does not end");
   }],
+  ["a low window has a picture, and nothing lies over the plots", async () => {
+    for (const [width, height] of [[640, 400], [960, 540]]) {
+      await page.setViewportSize({ width, height });
+      await viewer.drawn();
+      const [picture, tools, dock] = await page.evaluate(() => ["stage", "tools", "dock"].map((id) => {
+        const { top, bottom, height } = document.getElementById(id).getBoundingClientRect();
+        return { top, bottom, height };
+      }));
+      check(picture.height >= 200, `the picture is ${picture.height} high at ${width} x ${height}`);
+      check(tools.bottom <= dock.top && dock.top <= height - 35, `the tools end at ${tools.bottom}, the plots begin at ${dock.top} at ${width} x ${height}`);
+    }
+    await page.setViewportSize({ width: 1280, height: 800 });
+    await viewer.drawn();
+  }],
   ["the graft is bent by 20 degrees", async () => {
     await page.click("#skeleton");
     await viewer.holds("the nodes of the skeleton", () => window.tombolo.skeleton?.places.length > 0);
@@ -63,7 +77,7 @@ const steps = [
   ["where the mesh is worst is shown", async () => {
     await page.click("#quality");
     await viewer.until("the worst cells", (now) => "worst cells" in now.views);
-    await viewer.holds("the rings around them", () => document.querySelectorAll("#marks circle.cell").length > 0);
+    await viewer.holds("ten rings around them", () => document.querySelectorAll("#marks circle.cell").length === 10);
     await filmed("worst");
     await page.click("#quality");
     await viewer.until("the worst cells gone", (now) => !("worst cells" in now.views));

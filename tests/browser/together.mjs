@@ -94,10 +94,13 @@ const steps = [
     await bo.page.click("#wheel");
     await anna.page.waitForSelector("#asked:not([hidden])");
     check(/^<i>Bo<\/i> \(c\d+\) asks to steer\.$/.test(await anna.text("#asked-text")), `the page says "${await anna.text("#asked-text")}"`);
+    await known(bo, "that the answer is waited for", () => !document.getElementById("waiting").hidden && /is told that you ask/.test(document.getElementById("waiting").textContent));
+    check(await bo.page.locator("#refusal").isHidden(), "to have to wait counts as an error");
     await anna.picture("people");
     await clean(anna, "asked");
     await anna.page.click('#people-list li:nth-child(2) [data-act="hand-over"]');
     await bo.until("the wheel", (seen) => seen.role === "driver");
+    check(await bo.page.locator("#waiting").isHidden(), "an answer is still waited for");
     check(await anna.page.locator('#people-list [data-act="hand-over"]').count() === 0, "one who watches can hand the wheel over");
     await bo.page.click("#viewers");
     await bo.page.click('#people-list li:nth-child(1) [data-act="hand-over"]');
@@ -113,8 +116,12 @@ const steps = [
     for (const key of ["x", "c", "z"]) {
       await anna.page.focus("#scene");
       await anna.page.keyboard.press(key);
-      const { camera } = await now(anna);
-      await known(carl, `the camera after ${key}`, (wanted) => JSON.stringify(window.tombolo.camera) === JSON.stringify(wanted), camera);
+      // Where its middle is drawn is each picture's own: it depends on what lies over it.
+      const { middle, ...camera } = (await now(anna)).camera;
+      await known(carl, `the camera after ${key}`, (wanted) => {
+        const { middle, ...camera } = window.tombolo.camera;
+        return JSON.stringify(camera) === JSON.stringify(wanted);
+      }, camera);
     }
     check((await now(carl)).following, "it is not followed any more though nobody has turned the picture");
     const before = (await now(bo)).camera;

@@ -8,7 +8,7 @@ import type { Stand } from "./picture/camera";
 import type { Picture } from "./picture/scene";
 import type { OrderRecord, PreviewState } from "./store/state";
 
-export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null }
+export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null; /** Of the newest frame; null before the first. */ cycle: number | null }
 
 export interface PreviewInspection extends PreviewState { bounds: [Vector, Vector] | null }
 

@@ -1,7 +1,8 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
-import { keepIdentity } from "./connection/identity";
+import { keepIdentity, knownIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
-import type { Frame, Json, Monitor, ServerMessage, ToldHello } from "./connection/protocol";
+import type { Frame, Hello, Json, Monitor, ServerMessage, ToldHello, Vector } from "./connection/protocol";
+import { SentViews } from "./connection/sent-views";
 import { Stack } from "./connection/stack";
 import { watchDefects } from "./defects";
 import { part, write } from "./dom";
@@ -18,6 +19,7 @@ import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
 import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
+import { pointed } from "./number";
 import { own } from "./own";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
@@ -42,7 +44,7 @@ import { WheelPanel } from "./panels/wheel";
 import { makeCanvas } from "./picture/canvas";
 import type { Canvas } from "./picture/canvas";
 import { ScalarBars, fieldText, withUnit } from "./picture/bars";
-import { Triad, showEmpty } from "./picture/overlay";
+import { Triad, coveredBy, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
 import { Pins } from "./picture/pins";
 import { watchPointer } from "./picture/pointer";
@@ -58,7 +60,6 @@ import { paint, save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
 import type { Bar } from "./picture/scene";
 import { Checker } from "./pipelines/checker";
-import type { CheckWorker } from "./pipelines/checker";
 import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
 import type { Action } from "./store/actions";
@@ -66,11 +67,11 @@ import { Commands } from "./store/commands";
 import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { fieldNamed, fieldsOf, sameFields } from "./store/fields";
-import { Kept } from "./store/kept";
+import { Kept, KeptRun, LONGEST_HISTORY } from "./store/kept";
 import { onlyLook } from "./store/looks";
 import type { Look } from "./store/looks";
 import { NO_PIPELINES, readDrafts } from "./store/pipeline-drafts";
-import { LINE, withQuality } from "./store/pipelines";
+import { LINE, WORST, withQuality } from "./store/pipelines";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
 import { INITIAL } from "./store/state";
@@ -81,6 +82,7 @@ import { addresses, kernel, stream } from "./start";
 const { connection } = stream;
 
 const kept = new Kept(window.localStorage, location.pathname);
+const keptRun = new KeptRun(sessionStorage, location.pathname);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
 const DRAFTS = `tombolo-drafts ${location.pathname}`;
 const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);
@@ -166,8 +168,11 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
+  covered: () => coveredBy(part("stage"), part("tools"), part("bars")),
   lost: (gone) => { isLost = gone; sayEmpty(); },
 });
+// The bars of a view may come after the first picture, and go.
+new ResizeObserver(() => scene.camera.refit()).observe(part("bars"));
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
 const line = new Ruler(marks, "line", (from, to) => {
@@ -189,6 +194,13 @@ function measureWith(one: Ruler): void {
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
 const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
 const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active || line.active || notes.choosing);
+/** The place of the model under a place of the page, in numbers that a person would write down. */
+function placeAt(x: number, y: number): Vector | null {
+  const probe = scene.probe(x, y);
+  const reading = probe && scene.read(probe);
+  const [low, high] = scene.bounds() ?? [[0, 0, 0], [0, 0, 0]];
+  return reading && pointed(reading.point, Math.hypot(...low.map((from, k) => high[k]! - from)));
+}
 watchPointer(part("scene"), scene, selection, {
   reading: (x, y) => {
     const probe = scene.probe(x, y);
@@ -197,16 +209,14 @@ watchPointer(part("scene"), scene, selection, {
   },
   clicked: (x, y) => {
     if (notes.choosing) {
-      const probe = scene.probe(x, y);
-      const reading = probe && scene.read(probe);
-      if (reading) notes.take(reading.point);
+      const place = placeAt(x, y);
+      if (place) notes.take(place);
       return true;
     }
     const measuring = [ruler, line].find(({ active }) => active);
     if (!measuring) return false;
-    const probe = scene.probe(x, y);
-    const reading = probe && scene.read(probe);
-    if (reading) measuring.take(reading.point);
+    const place = placeAt(x, y);
+    if (place) measuring.take(place);
     return true;
   },
 });
@@ -222,7 +232,7 @@ const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!,
   projection: () => scene.projection(), bounds: () => scene.bounds(), redraw: () => scene.redraw(),
   points: () => scene.layers.get(store.state.chosenView ?? "")?.coordinates ?? new Float32Array(0),
 }, slice);
-const earlier: Earlier = new Earlier(store, () => scene.layers.values(), () => {
+const earlier: Earlier = new Earlier(store, () => [...scene.layers.values()].filter(({ name }) => sentViews.has(name)), () => {
   compare.update();
   linePlot.update();
   histogramPlot.update();
@@ -241,8 +251,7 @@ const notes: NotesPanel = new NotesPanel(store, commands, marks, {
   flyTo: (place) => scene.camera.flyTo(place),
   middle: () => {
     const { left, top, width, height } = part("scene").getBoundingClientRect();
-    const probe = scene.probe(left + width / 2, top + height / 2);
-    return (probe && scene.read(probe))?.point ?? scene.camera.stand.focalPoint;
+    return placeAt(left + width / 2, top + height / 2) ?? scene.camera.stand.focalPoint;
   },
 }, reveal);
 /** What a view holds now. */
@@ -281,10 +290,11 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
   },
   trouble: report,
 });
-const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key) => {
+const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key, isNew) => {
   history.choose(key);
-  dock.choose(history);
-});
+  if (isNew) dock.choose(history);
+}, () => sentViews.update());
+const sentViews: SentViews = new SentViews(store, () => pins.views, onlyView, (message) => commands.ask(message));
 watchPictureTools(part("scene"), part("stage"), {
   pin: (x, y) => {
     const probe = scene.probe(x, y);
@@ -303,10 +313,10 @@ pipelines.onChange(() => store.dispatch({ type: "pipelines known", pipelines: pi
 new PipelinesPanel(store, commands, () => scene.bounds());
 new PipelineEditorPanel(store, commands, {
   schema: () => loadJson(addresses.pipelineSchema), load: () => import("./pipelines/editor"),
-  checker: new Checker(() => new Worker(new URL("./pipelines/check.worker.ts", import.meta.url), { type: "module" }) as unknown as CheckWorker),
+  checker: new Checker(() => new Worker(new URL("./pipelines/check.worker.ts", import.meta.url), { type: "module" })),
 }, reveal);
 const bar = new StatusBar(store, commands);
-new WheelPanel(store, commands);
+const wheel = new WheelPanel(store, commands);
 const people = new PeoplePanel(store, commands, kept, () => window.location.href);
 new RecordingPanel(store, commands);
 new EditsPanel(store, commands);
@@ -358,13 +368,15 @@ function takeMessage(message: ServerMessage): void {
       const { id, message: text } = message.body;
       if (pipelines.answered(id)) void pipelines.reload();
       if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
-      if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || notes.refused(id, text))) return;
+      if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || wheel.told(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
     }
   }
 }
 
 function takeMonitor(monitor: Monitor): void {
+  // What the page has counted for itself is nothing to plot.
+  if (monitor.pipeline === WORST) return worst.take(monitor.values);
   monitors.update(monitor);
   monitored.add(monitor.pipeline, monitor.cycle, monitor.time ?? monitor.cycle, monitor.values);
   for (const { pipeline, name, unit } of store.state.hello?.monitors ?? []) monitored.setUnit(pipeline, name, unit ?? null);
@@ -385,14 +397,31 @@ function takeFrame(frame: Frame): void {
   if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
+/** Whether it is known which run this is: what was kept of it is there again, and can be kept anew. */
+let isRemembered = false;
+function remember({ back }: Hello): void {
+  if (isRemembered) return;
+  isRemembered = true;
+  // Only the run that this page was connected to before knows it by that.
+  if (!back || knownIdentity()?.back !== back) return keptRun.forget();
+  const { pins: known, history: said } = keptRun.read();
+  if (said !== null) monitored.restore(said);
+  pins.restore(known);
+  history.update();
+  dock.update();
+}
+window.addEventListener("pagehide", () => { if (isRemembered) keptRun.keep(pins.kept, monitored.kept(LONGEST_HISTORY)); });
+
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;
+  remember(hello);
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));
   if (hello.monitors) {
-    monitors.keep(hello.monitors);
-    monitored.keep(hello.monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
+    const shown = hello.monitors.filter(({ pipeline }) => pipeline !== WORST);
+    monitors.keep(shown);
+    monitored.keep(shown.map(({ pipeline, name }) => seriesKey(pipeline, name)));
   }
   if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });
@@ -475,6 +504,7 @@ publish({
     return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
       bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,
       triangles: (layer.topology?.triangles.length ?? 0) / 3, topology: layer.topology?.topology ?? null,
+      cycle: own(store.state.frames.views, name)?.cycle ?? null,
     }]));
   },
   get orders() { return structuredClone(store.state.orders); },

@@ -21,6 +21,31 @@ export function within(value: number, range: readonly [number, number]): string 
   return digits(Math.round(value / quantum) * quantum || 0, Math.max(4, Math.min(12, Math.ceil(Math.log10(Math.abs(value) / width || 1)) + 4)));
 }
 
+/** The fewest characters in which there is room for any number. */
+const LEAST_ROOM = 7;
+
+/** A number in so many characters: all of it where they suffice, else with as many of its digits as they do for, and its power of ten. */
+export function fitting(value: number, room: number): string {
+  const whole = String(value);
+  if (whole.length <= room || !Number.isFinite(value)) return whole;
+  for (let count = room; count > 1; count--) {
+    const rounded = Number(value.toPrecision(count));
+    const found = [String(rounded), rounded.toExponential().replace("e+", "e")].find((text) => text.length <= Math.max(room, LEAST_ROOM));
+    if (found !== undefined) return found;
+  }
+  return Number(value.toPrecision(1)).toExponential().replace("e+", "e");
+}
+
+/** What a number of a model is rounded to, in parts of its size: finer than anybody points, and coarser than what rounding leaves. */
+const POINTED = 1e-6;
+
+/** A place that somebody has pointed at, in a box of this size (its diagonal) or larger, without what rounding has left in its digits. */
+export function pointed(place: readonly [number, number, number], size: number): [number, number, number] {
+  if (!(size > 0) || !Number.isFinite(size)) return [...place];
+  const power = Math.floor(Math.log10(size * POINTED));
+  return place.map((part) => (power >= 0 ? Math.round(part / 10 ** power) * 10 ** power : Number(part.toFixed(Math.min(100, -power)))) + 0) as [number, number, number];
+}
+
 /** Seconds in the unit that suits them. */
 export function seconds(value: number | null | undefined): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";

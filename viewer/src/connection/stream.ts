@@ -21,7 +21,7 @@ export class Stream {
   readonly connection: Connection;
   private readonly decoder: Decoder;
   private listener: StreamListener | null = null;
-  private kept: ((listener: StreamListener) => void)[] = [];
+  private readonly kept: ((listener: StreamListener) => void)[] = [];
   /** Frames of this connection that were decoded before somebody listened. */
   private unacknowledged = 0;
   /** Why no frame can ever be decoded on this page; empty where they can. */

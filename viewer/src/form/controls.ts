@@ -2,7 +2,7 @@
 import type { Json } from "../connection/protocol";
 import { element, identifier, write as writeText } from "../dom";
 import { exactCell } from "../exact";
-import { readNumber, whyNoNumber, words } from "../number";
+import { fitting, readNumber, whyNoNumber, words } from "../number";
 import type { Problem } from "../store/state";
 import { startOf, startOfObject } from "./schema";
 import type { Field, Property } from "./schema";
@@ -22,6 +22,8 @@ interface Naming { label: string; path: string; unit: string; hint: string }
 export type Special = (property: Property) => Control | null;
 
 const AXES = ["x", "y", "z"];
+/** The most characters that are seen in an input: of a text, of a number, and of one of three that stand beside one another. */
+const SEEN = 20, ROOM = 12, NARROW_ROOM = 7;
 
 export function makeControl(field: Field, label: string, special: Special = () => null, naming: Partial<Naming> = {}): Control {
   return make(field, { label, path: label, unit: "", hint: "", ...naming }, special);
@@ -97,21 +99,18 @@ export function numberFrom(text: string, field: Field & { kind: "number" }): num
   return value;
 }
 
-/** How a number is written into an input: all of it where that is short, else the digits that a person can use. */
-export function numberText(value: Json | undefined): string {
-  if (typeof value !== "number") return "";
-  const whole = String(value);
-  return whole.length <= 10 ? whole : String(Number(value.toPrecision(6)));
-}
+/** How a number is written into an input; nothing for what is none. */
+export const numberText = (value: Json | undefined): string => (typeof value === "number" ? fitting(value, ROOM) : "");
 
 /** An input for a number. A value that was written into it and not touched since is read as it was, to the last bit. */
-function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTMLElement): { input: HTMLInputElement; read(problems: Problem[]): number | undefined; write(value: Json | undefined): void } {
+function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTMLElement, room = ROOM): { input: HTMLInputElement; read(problems: Problem[]): number | undefined; write(value: Json | undefined): void } {
   const input = numberInput(label);
   const cell = exactCell(input);
   return {
     input,
     read: (problems) => {
       const value = cell.untouched() ?? numberFrom(input.value, field);
+      input.title = cell.whole();
       if (typeof value === "number") {
         mark(input, wrong, "");
         return value;
@@ -121,7 +120,7 @@ function numberCell(field: Field & { kind: "number" }, label: string, wrong: HTM
       return undefined;
     },
     write: (value) => {
-      cell.write(typeof value === "number" ? value : null, numberText(value));
+      cell.write(typeof value === "number" ? value : null, room);
       mark(input, wrong, "");
     },
   };
@@ -137,7 +136,7 @@ function numberControl(field: Field & { kind: "number" }, naming: Naming): Contr
 function vectorControl(field: Field & { kind: "vector" }, { label, path, unit, hint }: Naming): Control {
   const names = field.length <= 3 ? AXES : Array.from({ length: field.length }, (_, i) => String(i + 1));
   const wrongs = Array.from({ length: field.length }, wrongText);
-  const cells = wrongs.map((wrong, i) => numberCell(field.item, `${path} ${names[i]}`, wrong));
+  const cells = wrongs.map((wrong, i) => numberCell(field.item, `${path} ${names[i]}`, wrong, NARROW_ROOM));
   const shown = cells.map((cell, i) => element("span", { class: "component" }, element("span", { "aria-hidden": "true" }, names[i]!), cell.input));
   const start = startOf(field);
   const write = (value: Json | undefined): void => cells.forEach((cell, i) => cell.write(Array.isArray(value) ? value[i] : Array.isArray(start) ? start[i] : 0));
@@ -188,9 +187,12 @@ function booleanControl(naming: Naming): Control {
 function textControl(naming: Naming, parse: (text: string) => Json | undefined, format: (value: Json) => string, start: Json | undefined): Control {
   const input = element("input", { type: "text", autocomplete: "off", spellcheck: "false" });
   const wrong = wrongText();
+  // What is longer than the input is read whole under the pointer.
+  const hint = (): void => { input.title = input.value.length > SEEN ? input.value : ""; };
   return {
     root: row(naming, input, wrong),
     read: (problems) => {
+      hint();
       try {
         const value = parse(input.value);
         mark(input, wrong, "");
@@ -205,6 +207,7 @@ function textControl(naming: Naming, parse: (text: string) => Json | undefined, 
     write: (value) => {
       const shown = value ?? start;
       input.value = shown === undefined ? "" : format(shown);
+      hint();
       mark(input, wrong, "");
     },
   };
@@ -272,7 +275,7 @@ function listControl(field: Field & { kind: "list" }, naming: Naming, special: S
     write: (value) => {
       const values = Array.isArray(value) ? value : [];
       // The inputs stay what they are while they are written into: a hand may be on one of them.
-      if (values.length === entries.length) entries.forEach(({ control }, i) => control.write(values[i]!));
+      if (values.length === entries.length) entries.forEach(({ control }, i) => control.write(values[i]));
       else {
         entries = values.map(entry);
         show();

@@ -38,7 +38,7 @@ export const isMuted = (edit: Json): boolean => partsOf(edit)?.body.muted === tr
 
 const capital = (text: string): string => text.slice(0, 1).toUpperCase() + text.slice(1);
 const numbers = (value: Json | undefined): number[] | null =>
-  Array.isArray(value) && value.length > 0 && value.every((entry) => typeof entry === "number") ? value as number[] : null;
+  Array.isArray(value) && value.length > 0 && value.every((entry) => typeof entry === "number") ? value : null;
 
 function features(body: Values): string {
   const names = Array.isArray(body.features) ? body.features.map(String) : [];
@@ -53,7 +53,7 @@ function action(key: string, body: Values, form: OrderForm | null): string {
   const factors = numbers(body.factors);
   if (factors) {
     const changed = factors.flatMap((factor, axis) => (factor === 1 ? [] : [`${SIZES[axis] ?? axis} × ${digits(factor, 3)}`]));
-    if (factors.length === 3 && new Set(factors).size === 1 && factors[0] !== 1) return `size × ${digits(factors[0]!, 3)}`;
+    if (factors.length === 3 && new Set(factors).size === 1 && factors[0] !== 1) return `size × ${digits(factors[0], 3)}`;
     return changed.length > 0 ? changed.join(", ") : "size unchanged";
   }
   const by = numbers(body.by);
@@ -74,5 +74,5 @@ function action(key: string, body: Values, form: OrderForm | null): string {
 function along(by: readonly number[]): string {
   const moved = by.flatMap((value, axis) => (value === 0 ? [] : [axis]));
   if (moved.length === 0) return "nowhere";
-  return moved.length === 1 ? `by ${digits(by[moved[0]!]!, 3)} along ${AXES[moved[0]!] ?? moved[0]}` : `by (${by.map((value) => digits(value, 3)).join(", ")})`;
+  return moved.length === 1 ? `by ${digits(by[moved[0]!], 3)} along ${AXES[moved[0]!] ?? moved[0]}` : `by (${by.map((value) => digits(value, 3)).join(", ")})`;
 }

@@ -21,6 +21,8 @@ export function bent(branch: readonly BranchNode[], at: number, axis: Vector, de
   const movable = [before, behind].filter(([next]) => next !== undefined && !branch[next]!.isPinned).length;
   if (movable === 0) return null;
   const ways = branch.map((): Vector => [0, 0, 0]);
+  // The dust of the rotation, held against the branch, is less than what anybody means.
+  const step = 10 ** (Math.floor(Math.log10(distances(branch, 0, indices(1, branch.length)).at(-1) || 1)) - 9);
   for (const [side, sense] of [[behind, 1], [before, -1]] as const) {
     const [next] = side;
     if (next === undefined || branch[next]!.isPinned) continue;
@@ -34,8 +36,6 @@ export function bent(branch: readonly BranchNode[], at: number, axis: Vector, de
       const part = isHeld && end > first ? (end - away[i]!) / (end - first) : 1;
       const from = subtract(node.place, pivot.place);
       const way = times(subtract(transformed(matrix, from), from), part);
-      // The dust of the rotation is less than what anybody means.
-      const step = 10 ** (Math.floor(Math.log10(length(way) || 1)) - 9);
       ways[index] = way.map((value) => toStep(value, step)) as Vector;
     });
   }

@@ -45,7 +45,7 @@ export function gizmoShapes(projection: Projection, center: Vector, kinds: reado
       const [u, v] = across(axis);
       const corners = [[PLANE.from, PLANE.from], [PLANE.to, PLANE.from], [PLANE.to, PLANE.to], [PLANE.from, PLANE.to]]
         .map(([a, b]) => at([u, a!], [v, b!]));
-      return corners.every((corner) => corner !== null) ? { part: { kind: "plane", axis }, lines: [], fill: corners as Place[], order: 1 } : null;
+      return corners.every((corner) => corner !== null) ? { part: { kind: "plane", axis }, lines: [], fill: corners, order: 1 } : null;
     },
     arrow: (axis) => {
       const [from, neck, tip] = [at([axis, ARROW.from]), at([axis, ARROW.to - ARROW.head]), at([axis, ARROW.to])];

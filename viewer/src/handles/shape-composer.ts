@@ -130,7 +130,8 @@ export class ShapeComposer implements Composer {
       if (amount.kind === "move") return { key: own, values: { by: amount.by } };
       if (amount.kind === "turn" && lock.kind === "ring") return { key: own, values: { axis: unit(lock.axis), degrees: amount.degrees, ...center } };
       if (amount.kind === "scale" && lock.kind === "box") {
-        const factors: Vector = [...(this.continues(lock) ? vectorOf(bodies[own]?.factors) ?? [1, 1, 1] : [1, 1, 1]) as Vector];
+        const before: Vector = this.continues(lock) ? vectorOf(bodies[own]?.factors) ?? [1, 1, 1] : [1, 1, 1];
+        const factors: Vector = [...before];
         factors[lock.axis] = amount.factor;
         return { key: own, values: { factors, ...center } };
       }

@@ -14,7 +14,7 @@ export class VisibleFaces {
   private readonly width: number;
   private readonly height: number;
   /** The sense in which most of what is seen goes round in the picture: the other is that of a back. */
-  private sense = 0;
+  private readonly sense: number = 0;
 
   /** `points` are interleaved, `triangles` their indices three by three. */
   constructor(points: Float32Array, private readonly triangles: Uint32Array, projection: Projection) {

@@ -5,7 +5,7 @@ import type { DataFrame, Vector } from "../connection/protocol";
 import { download, element, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
-import { digits, readNumber, whyNoNumber } from "../number";
+import { readNumber, whyNoNumber } from "../number";
 import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
@@ -21,6 +21,9 @@ import type { Spread } from "./value-plot";
 
 /** The shortest time between two drawings of new values, in milliseconds. */
 const REST = 250;
+
+/** The most characters of a coordinate that are seen in its input. */
+const ROOM = 9;
 
 /** What the plot needs of the picture: what the line holds now, and how the view is coloured whose field is plotted. */
 export interface LineSource {
@@ -84,7 +87,7 @@ export class LinePlot extends ValuePlot {
     const line = lineOf(this.pipelines.get(LINE));
     this.line = line;
     for (const end of ["from", "to"] as const) {
-      this.ends[end].forEach(({ input, cell }, k) => { if (line && document.activeElement !== input) cell.write(line[end][k]!, digits(line[end][k], 6)); });
+      this.ends[end].forEach(({ input, cell }, k) => { if (line && document.activeElement !== input) cell.write(line[end][k]!, ROOM); });
     }
     this.say();
     this.changed();
@@ -103,7 +106,7 @@ export class LinePlot extends ValuePlot {
   private typed(): void {
     const read = (end: "from" | "to"): (number | null)[] => this.ends[end].map(({ input, cell }) => {
       const value = cell.untouched() ?? readNumber(input.value);
-      markWrong(input, value === null && input.value !== "" ? whyNoNumber(input.value) : "");
+      markWrong(input, value === null && input.value !== "" ? whyNoNumber(input.value) : "", cell.whole());
       return value;
     });
     const [from, to] = [read("from"), read("to")];

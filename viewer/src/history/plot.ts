@@ -3,9 +3,10 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
-import { SERIES_COLOURS, axesOf, labelled, padded, roomy, seriesColour, seriesStyle } from "./plotting";
+import { placeNames, shortened } from "./mark-names";
+import { SERIES_COLOURS, axesOf, calm, labelled, roomy, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
-import type { History, Mark, Series } from "./series";
+import type { Comparison, History, Mark, Series } from "./series";
 import { compare, firstChoice } from "./series";
 import { ValueTable } from "./table";
 
@@ -17,8 +18,10 @@ const AXES = 4;
 const MARK_LINES = 3;
 /** The shortest time between two drawings of new values, in milliseconds. */
 const REST = 250;
-/** The series of pins (`picture/pins.ts`), which are gone with the page. */
-const PIN = /^probe \d+, /;
+/** The most characters of the name of an order. */
+const LONGEST_NAME = 28;
+/** The sources of the series of pins (`picture/pins.ts`): the place has a name of its own, and the field is that of the picture. */
+const PIN = /^(probe \d+), /;
 
 export class HistoryPlot implements Tab {
   readonly title = "History";
@@ -36,8 +39,10 @@ export class HistoryPlot implements Tab {
   private zoom: [number, number] | null = null;
   private readonly canvas = element("div", { class: "plot" });
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
-  private readonly heading = element("span", { class: "hint" });
+  private readonly heading = element("p", { class: "hint table-title" });
   private readonly table = new ValueTable(["value", "before", "difference"], this.heading);
+  /** The pins that are drawn, which the run does not know; the oldest first. */
+  private pinned: string[] = [];
   private readonly whole: HTMLButtonElement;
 
   /**
@@ -48,7 +53,7 @@ export class HistoryPlot implements Tab {
     this.whole = element("button", { type: "button", class: "small", title: "Show the whole history again", disabled: true, onclick: () => this.zoomTo(null) }, "Whole");
     const csv = element("button", { type: "button", class: "small", title: "All that is kept of all monitors, as comma-separated values", onclick: () => this.download() }, "CSV");
     this.body = element("div", { class: "dock-body" }, this.canvas,
-      element("div", { class: "values" }, this.table.element,
+      element("div", { class: "values" }, this.heading, this.table.element,
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
     this.tools = [element("span", { class: "hint" }, "drag to zoom · double-click for the whole"), this.whole, csv];
     new ResizeObserver(() => this.resize()).observe(this.canvas);
@@ -84,23 +89,29 @@ export class HistoryPlot implements Tab {
     this.values();
   }
 
-  /** Draws a series that was not there before: somebody has asked for it. */
+  /** Draws a series of a pin, which was not there before: somebody has asked for it. The monitors stay those that were chosen. */
   choose(key: string): void {
-    this.change([...this.chosen().filter((other) => other !== key), key].slice(-DRAWN));
+    this.change(key, true);
   }
 
-  private change(picked: readonly string[]): void {
-    this.picked = picked;
-    const kept = picked.filter((key) => !PIN.test(key));
-    // Pins alone say nothing of the monitors: those of the beginning are shown where the pins are no more.
-    this.changed(kept.length === 0 && picked.length > 0 ? null : kept);
+  private change(key: string, isDrawn: boolean): void {
+    if (PIN.test(key)) {
+      this.pinned = [...this.pinned.filter((other) => other !== key), ...(isDrawn ? [key] : [])];
+      return;
+    }
+    const monitors = this.chosen().filter((other) => other !== key && !PIN.test(other));
+    this.picked = isDrawn ? [...monitors, key] : monitors;
+    this.changed(this.picked);
   }
 
   /** What is drawn. Where nothing is there of what was chosen, in another run, it is what one sees at first. */
   private chosen(): string[] {
     const { series } = this.history;
-    const known = this.picked?.filter((key) => series.some((one) => one.key === key));
-    return (known && (known.length > 0 || this.picked?.length === 0) ? known : firstChoice(series)).slice(0, DRAWN);
+    const there = (keys: readonly string[]): string[] => keys.filter((key) => series.some((one) => one.key === key));
+    const known = this.picked && there(this.picked);
+    const monitors = known && (known.length > 0 || this.picked?.length === 0) ? known : firstChoice(series.filter(({ source }) => !PIN.test(source)));
+    const pinned = there(this.pinned).slice(-DRAWN);
+    return [...monitors.slice(0, DRAWN - pinned.length), ...pinned];
   }
 
   private draw(): void {
@@ -134,13 +145,13 @@ export class HistoryPlot implements Tab {
       const position = chosen.indexOf(one.key);
       const box = element("input", {
         type: "checkbox", "data-series": one.key, disabled: position < 0 && chosen.length >= DRAWN, onchange: () => {
-          this.change(box.checked ? [...this.chosen(), one.key] : this.chosen().filter((other) => other !== one.key));
+          this.change(one.key, box.checked);
           this.draw();
         },
       });
       box.checked = position >= 0;
       if (position >= 0) box.style.accentColor = seriesStyle(position);
-      return element("label", { title: `pipeline ${one.source}` }, box, label(one));
+      return element("label", { title: PIN.test(one.source) ? one.source : `pipeline ${one.source}` }, box, label(one));
     }));
     if (focused) this.choices.querySelector<HTMLElement>(`[data-series="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -154,14 +165,15 @@ export class HistoryPlot implements Tab {
       width, height, padding: [10, 8, 0, 0],
       legend: { show: false },
       cursor: { drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
-      scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, { auto: true, range: padded }])) },
+      scales: { x: { time: false }, ...Object.fromEntries(scales.map((scale) => [scale, { auto: true, range: calm }])) },
       // A line goes on where only another source has spoken, and breaks where its own has said what is no number.
       series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, points: { show: false } }))],
       axes: [
         { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
         ...scales.slice(0, AXES).map((scale, i) => ({
           ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: roomy(58), grid: i === 0 ? grid : { show: false },
-          stroke: scales.length === 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
+          // In the colour of its series, where it has but one.
+          stroke: scales.length === 1 || series.filter((one) => scaleOf(one) === scale).length > 1 ? axis.stroke : colour(series.findIndex((one) => scaleOf(one) === scale)),
           values: labelled,
         })),
       ],
@@ -210,20 +222,31 @@ export class HistoryPlot implements Tab {
     ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
     ctx.textAlign = "left";
     ctx.textBaseline = "alphabetic";
-    /** Where the names in each line end: one that finds no room stands in none. */
-    const ends = new Array<number>(MARK_LINES).fill(-Infinity);
-    for (const mark of this.marks) {
-      const x = Math.round(plot.valToPos(mark.cycle, "x", true)) + 0.5;
+    const measure = (text: string): number => ctx.measureText(text).width;
+    const marks = this.marks.map(({ cycle, label }) => {
+      const text = label.length > LONGEST_NAME ? `${label.slice(0, LONGEST_NAME - 1)}…` : label;
+      return { text, x: Math.round(plot.valToPos(cycle, "x", true)) + 0.5, width: measure(text) };
+    });
+    for (const { x } of marks) {
       ctx.beginPath();
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      const label = mark.label.length > 28 ? `${mark.label.slice(0, 27)}…` : mark.label;
-      const line = ends.findIndex((end) => end < x);
-      if (line < 0) continue;
-      ends[line] = x + ctx.measureText(label).width + 10 * devicePixelRatio;
-      ctx.fillText(label, x + 4 * devicePixelRatio, bbox.top + (11 + 13 * line) * devicePixelRatio);
     }
+    const places = placeNames(marks, [bbox.left, bbox.left + bbox.width], MARK_LINES, 4 * devicePixelRatio);
+    const [ink, ground] = ["--pressed", "--panel"].map((name) => style.getPropertyValue(name)) as [string, string];
+    marks.forEach(({ text }, i) => {
+      const place = places[i];
+      if (!place) return;
+      const top = bbox.top + 13 * place.row * devicePixelRatio;
+      // Where it crosses the line of another, or a curve, it is still read.
+      ctx.globalAlpha = 0.8;
+      ctx.fillStyle = ground;
+      ctx.fillRect(place.left - 2 * devicePixelRatio, top, place.width + 4 * devicePixelRatio, 13 * devicePixelRatio);
+      ctx.globalAlpha = 1;
+      ctx.fillStyle = ink;
+      ctx.fillText(shortened(text, place.width, measure), place.left, top + 11 * devicePixelRatio);
+    });
     ctx.restore();
   }
 
@@ -239,12 +262,12 @@ export class HistoryPlot implements Tab {
       const one = all.find((candidate) => candidate.key === key);
       const found = compare(this.history, key, cycle, this.marks);
       order = found.order ?? order;
-      const part = found.difference !== null && found.before ? ` (${digits((100 * found.difference) / Math.abs(found.before), 2)} %)` : "";
-      const cells = [digits(found.value), digits(found.before), found.difference === null ? "–" : `${found.difference > 0 ? "+" : ""}${digits(found.difference, 3)}${part}`];
-      return { name: one ? label(one) : "", colour: seriesStyle(i), cells };
+      const { shown, hint } = differenceText(found);
+      return { name: one ? label(one) : "", colour: seriesStyle(i), cells: [digits(found.value), digits(found.before), shown], hint };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
     write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
+    this.heading.title = this.heading.textContent;
     this.table.show(rows);
   }
 
@@ -262,7 +285,24 @@ export class HistoryPlot implements Tab {
   }
 }
 
-/** Series of one unit share an axis; one without a unit has its own. */
-const scaleOf = (series: Series): string => (series.unit ? `unit ${series.unit}` : series.key);
+/** Series of one unit share an axis, and of those without a unit the ones of one name: the same field at two pins. */
+const scaleOf = ({ unit, name }: Series): string => (unit ? `unit ${unit}` : `name ${name}`);
 
-const label = ({ name, unit }: Series): string => (unit ? `${name} [${unit}]` : name);
+/** A series in words: its name and unit, before which stands at which pin it is read. */
+function label({ source, name, unit }: Series): string {
+  const [, pin] = PIN.exec(source) ?? [];
+  return `${pin === undefined ? "" : `${pin}: `}${name}${unit ? ` [${unit}]` : ""}`;
+}
+
+/** A difference beyond which a part in the hundred says less than the difference itself. */
+const LARGE = 1000;
+
+/** By how much a value is another one than before: in percent where that says something, else as it is; the hint has both. */
+function differenceText({ before, difference }: Comparison): { shown: string; hint: string } {
+  if (difference === null) return { shown: "–", hint: "" };
+  const signed = (value: number, unit: string): string => `${value > 0 ? "+" : ""}${digits(value, 3)}${unit}`;
+  const percent = before ? (100 * difference) / Math.abs(before) : null;
+  const [plain, part] = [signed(difference, ""), percent === null ? "" : signed(percent, "\u00a0%")];
+  if (difference === 0) return { shown: "0", hint: "unchanged" };
+  return { shown: percent !== null && Math.abs(percent) < LARGE ? part : plain, hint: part === "" ? plain : `${plain} (${part})` };
+}

@@ -25,13 +25,21 @@ export function axesOf(root: HTMLElement): { grid: Grid; axis: { stroke: Colour;
 /** A plot shows no smaller part of its values than this: the labels of an axis have twelve digits. */
 const FINEST = 1e-9;
 
-/** A little room above and below; a line that is level lies in the middle. */
-export function padded(_: uPlot, low: number | null, high: number | null): [number, number] {
+/** Nor does one over time, in which what only rounds and iterates would look like something that has happened. */
+const CALMEST = 1e-4;
+
+type Range = (plot: uPlot, low: number | null, high: number | null) => [number, number];
+
+/** A little room above and below, so that no less than a part `finest` of the values is shown; a line that is level lies in the middle. */
+const padding = (finest: number): Range => (_, low, high) => {
   if (low === null || high === null || !Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
   const size = Math.max(Math.abs(low), Math.abs(high));
-  const room = high > low ? Math.max(0.06 * (high - low), (FINEST * size - (high - low)) / 2) : size * 0.1 || 1;
+  const room = high > low ? Math.max(0.06 * (high - low), (finest * size - (high - low)) / 2) : size * 0.1 || 1;
   return [low - room, high + room];
-}
+};
+
+export const padded = padding(FINEST);
+export const calm = padding(CALMEST);
 
 /** The values at an axis, with the digits that tell them apart. */
 export function labelled(_: uPlot, ticks: number[]): string[] {

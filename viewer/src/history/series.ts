@@ -114,6 +114,32 @@ export class History {
     return null;
   }
 
+  /** What is known, to be kept while the page is loaded again, in so many characters at most: old values thin out. Null where there is no room. */
+  kept(longest: number): string | null {
+    const sources = [...this.sources].map(([name, source]) => ({ name, ...source, columns: new Map(source.columns) }));
+    // At first by what a number takes at most, so that not much is written in vain.
+    for (let room = longest / LONGEST_NUMBER; thinTo(sources, room); room /= 2) {
+      const text = JSON.stringify(sources.map(({ name, cycles, times, columns }): KeptSource => [name, cycles, times, [...columns].map(([of, values]) =>
+        [of, this.list.get(seriesKey(name, of))?.unit ?? null, values.map((value) => (value === undefined ? UNSAID : value))])]));
+      if (text.length <= longest) return text;
+    }
+    return null;
+  }
+
+  /** Takes what was kept before the page was loaded again; rubbish counts as nothing. */
+  restore(text: string): void {
+    for (const [source, cycles, times, columns] of readKept(text)) {
+      cycles.forEach((cycle, row) => {
+        const said = columns.flatMap(([name, , values]): [string, number | null][] => {
+          const value = values[row];
+          return value === UNSAID || value === undefined ? [] : [[name, value]];
+        });
+        this.add(source, cycle, times[row]!, Object.fromEntries(said));
+      });
+      for (const [name, unit] of columns) this.setUnit(source, name, unit);
+    }
+  }
+
   /** All that is kept, as comma-separated values: cycle, time, then a column for each series. */
   csv(): string {
     const { series } = this;
@@ -122,6 +148,33 @@ export class History {
     const lines = [["cycle", "time", ...series.map(name)].join(",")];
     cycles.forEach((cycle, row) => lines.push([cycle, times[row], ...columns.map((column) => column[row] ?? "")].join(",")));
     return `${lines.join("\n")}\n`;
+  }
+}
+
+/** The most characters of a number and what parts it from the next. */
+const LONGEST_NUMBER = 20;
+/** Stands for what was not said, which JSON does not know. */
+const UNSAID = false;
+
+/** A source as it is kept: its name, cycles and times, and for each series name, unit and values. */
+type KeptSource = [string, number[], number[], [string, string | null, (number | null | typeof UNSAID)[]][]];
+
+function readKept(text: string): KeptSource[] {
+  const isText = (value: unknown): boolean => typeof value === "string";
+  const isColumn = (value: unknown, rows: number, check: (value: unknown) => boolean): boolean => Array.isArray(value) && value.length === rows && value.every(check);
+  const isSource = (value: unknown): value is KeptSource => {
+    const [name, cycles, times, columns] = Array.isArray(value) ? value as unknown[] : [];
+    if (!isText(name) || !Array.isArray(cycles) || !Array.isArray(columns)) return false;
+    return [cycles, times].every((column) => isColumn(column, cycles.length, Number.isFinite)) && columns.every((column) => {
+      const [of, unit, values] = Array.isArray(column) ? column as unknown[] : [];
+      return isText(of) && (unit === null || isText(unit)) && isColumn(values, cycles.length, (said) => said === null || said === UNSAID || Number.isFinite(said));
+    });
+  };
+  try {
+    const read: unknown = JSON.parse(text);
+    return Array.isArray(read) ? read.filter(isSource) : [];
+  } catch {
+    return [];
   }
 }
 
@@ -146,6 +199,20 @@ function thin(source: Source): void {
   for (const [name, column] of source.columns) source.columns.set(name, keep(column));
 }
 
+/** Thins sources out, the largest first, until they have no more than so many numbers; says whether that could be done. */
+function thinTo(sources: readonly Source[], most: number): boolean {
+  const size = ({ cycles, columns }: Source): number => cycles.length * (columns.size + 2);
+  let total = sources.reduce((sum, source) => sum + size(source), 0);
+  while (total > most) {
+    const largest = sources.reduce((a, b) => (size(b) > size(a) ? b : a));
+    const before = size(largest);
+    thin(largest);
+    if (size(largest) === before) return false;
+    total += size(largest) - before;
+  }
+  return true;
+}
+
 // A text that a spreadsheet would take for a formula is not made by a solver's names.
 const quoted = (text: string): string => (/[",\n\r]/.test(text) || /^[=+\-@]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 
@@ -160,7 +227,14 @@ export function compare(history: History, key: string, cycle: number, marks: rea
   const order = marks.reduce<Mark | null>((last, mark) => (mark.cycle <= cycle && (!last || mark.cycle >= last.cycle) ? mark : last), null);
   // What was measured at the cycle of the order was measured before the shape changed.
   const before = order ? history.at(key, order.cycle) : null;
-  return { value, order, before, difference: value !== null && before !== null ? value - before : null };
+  return { value, order, before, difference: value !== null && before !== null ? difference(value, before) : null };
+}
+
+/** The part of a value below which a difference is what rounding has left. */
+const ROUNDING = 1e-9;
+
+function difference(value: number, before: number): number {
+  return Math.abs(value - before) <= ROUNDING * Math.max(Math.abs(value), Math.abs(before)) ? 0 : value - before;
 }
 
 /** What a person who asks for nothing wants to see: the pressure, what goes in and out, and the quality of the mesh; at most three. */

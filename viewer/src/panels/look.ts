@@ -1,9 +1,10 @@
 /** How the chosen view looks: by which field it is coloured, on which map, over which range; and its edges. */
 import { element, identifier, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
-import { readNumber, whyNoNumber, within, words } from "../number";
+import { readNumber, whyNoNumber, words } from "../number";
 import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
+import { textIn } from "../picture/ranges";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
 import type { Bar } from "../picture/scene";
 import type { Action } from "../store/actions";
@@ -16,15 +17,17 @@ import type { State } from "../store/state";
 import { sameParts } from "../store/store";
 import type { Store } from "../store/store";
 
-const RANGES: readonly [RangeKind, string][] = [["auto", "of each frame"], ["over time", "of all frames so far"], ["fixed", "fixed"]];
+const RANGES: readonly [RangeKind, string][] = [["auto", "of each frame"], ["over time", "of all so far"], ["fixed", "fixed"]];
 
+/** What a colour map is for stands above those of its kind: beside its name there is no room. */
+const MAP_KINDS = [...new Set(COLOUR_MAPS.map(({ kind }) => kind))];
 const option = (value: string | number, text: string): HTMLElement => element("option", { value }, text);
 
 export class LookPanel {
   private readonly heading = element("h2");
   private readonly field = element("select", { onchange: () => this.change({ field: this.field.value === "" ? null : this.field.value, component: -1 }) });
   private readonly component = element("select", { onchange: () => this.change({ component: Number(this.component.value) }) });
-  private readonly map = element("select", { onchange: () => this.change({ map: this.map.value }) }, ...COLOUR_MAPS.map(({ name, title, kind }) => option(name, `${title} (${kind})`)));
+  private readonly map = element("select", { onchange: () => this.change({ map: this.map.value }) }, ...MAP_KINDS.map((label) => element("optgroup", { label }, ...COLOUR_MAPS.filter(({ kind }) => kind === label).map(({ name, title }) => option(name, title)))));
   private readonly sample = element("div", { class: "sample", "aria-hidden": "true" });
   private readonly kind = element("select", { onchange: () => this.changeKind(this.kind.value as RangeKind) }, ...RANGES.map(([kind, text]) => option(kind, text)));
   private readonly low = this.end("lowest value");
@@ -145,7 +148,7 @@ export class LookPanel {
     const range: Range | null = look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
     this.ends.forEach(([input, cell], i) => {
       if (document.activeElement === input) return;
-      if (range) cell.write(range[i]!, within(range[i]!, look?.range.logarithmic ? [0, range[i]!] : range));
+      if (range) cell.write(range[i]!, textIn(range[i]!, range, look?.range.logarithmic === true));
       else cell.write(null, "");
       markWrong(input, "");
     });

@@ -7,9 +7,13 @@ import { digits } from "../number";
 /** The most values that are shown. */
 const ROWS = 100;
 
+interface Row { row: HTMLElement; shown: HTMLElement; value: number | null }
+
 /** The newest values of each monitor. */
 export class MonitorPanel {
-  private readonly rows = new Map<string, { row: HTMLElement; shown: HTMLElement }>();
+  private readonly rows = new Map<string, Row>();
+  /** The units of those whose unit is known. */
+  private units: ReadonlyMap<string, string> = new Map();
 
   constructor(private readonly root: HTMLElement) {}
 
@@ -20,11 +24,12 @@ export class MonitorPanel {
       if (!known) {
         if (this.rows.size >= ROWS) continue;
         const shown = element("output", {});
-        known = { shown, row: element("div", { class: "monitor", title: `pipeline ${monitor.pipeline}` }, element("span", {}, name), shown) };
+        known = { shown, value, row: element("div", { class: "monitor", title: `pipeline ${monitor.pipeline}` }, element("span", {}, name), shown) };
         this.rows.set(key, known);
         this.root.append(known.row);
       }
-      write(known.shown, digits(value, 4));
+      known.value = value;
+      this.say(key, known);
     }
     this.hide();
   }
@@ -32,12 +37,21 @@ export class MonitorPanel {
   /** The monitors that there are now: a value of another one will never be a new one again. */
   keep(monitors: readonly MonitorInformation[]): void {
     const now = new Set(monitors.map(({ pipeline, name }) => seriesKey(pipeline, name)));
-    for (const [key, { row }] of this.rows) {
-      if (now.has(key)) continue;
-      row.remove();
+    this.units = new Map(monitors.flatMap(({ pipeline, name, unit }): [string, string][] => (unit ? [[seriesKey(pipeline, name), unit]] : [])));
+    for (const [key, known] of this.rows) {
+      if (now.has(key)) {
+        this.say(key, known);
+        continue;
+      }
+      known.row.remove();
       this.rows.delete(key);
     }
     this.hide();
+  }
+
+  private say(key: string, { shown, value }: Row): void {
+    const unit = value === null ? undefined : this.units.get(key);
+    write(shown, `${digits(value, 4)}${unit === undefined ? "" : `\u00a0${unit}`}`);
   }
 
   private hide(): void {

@@ -10,8 +10,18 @@ import type { State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 
+/** Steps of a slider from one end to the other. */
+const STEPS = 200;
+/** From this ratio of its bounds on, a slider goes by powers of ten. */
+const WIDE = 100;
+
 interface Row {
   input: HTMLInputElement;
+  /** Null where the parameter has no bounds. */
+  slider: HTMLInputElement | null;
+  bounds: Bounds | null;
+  /** Whether a hand is on the slider, so that nothing is written under it. */
+  isSliding: boolean;
   wrong: HTMLElement;
   /** The value that the run has told last. */
   told: number;
@@ -50,7 +60,7 @@ export class ParameterPanel {
     const before = row?.pending?.told;
     this.answered(id);
     // Another viewer may have set it meanwhile. What the run has told before it had the message says nothing.
-    if (row && row.pending === null && before !== undefined && before !== row.told && row.input !== document.activeElement) this.write(row);
+    if (row && row.pending === null && before !== undefined && before !== row.told && !isHeld(row)) this.write(row);
   }
 
   /** The parameter that a message was to set; the message is settled. */
@@ -68,7 +78,7 @@ export class ParameterPanel {
       const { pending, told, input, wrong } = row;
       row.pending = null;
       if (!pending || pending.value === told) continue;
-      if (input !== document.activeElement) this.write(row);
+      if (!isHeld(row)) this.write(row);
       const lost = pending.id === null ? `${numberText(pending.value)} was not sent` : `The connection was lost before ${numberText(pending.value)} was confirmed`;
       mark(input, wrong, `${lost}; the run has ${numberText(told)}.`);
     }
@@ -90,20 +100,21 @@ export class ParameterPanel {
       row.told = value;
       if (row.pending?.value === value) row.pending = null;
       // A hand may be on it.
-      if (row.input !== document.activeElement) this.write(row);
+      if (!isHeld(row)) this.write(row);
     }
   }
 
   /** Shows what the run has. */
   private write(row: Row): void {
     row.input.value = row.text = numberText(row.told);
+    this.slide(row, row.told);
     mark(row.input, row.wrong, "");
   }
 
   private allow(why: string): void {
-    for (const { input } of this.rows.values()) {
-      input.disabled = why !== "";
-      input.title = why;
+    for (const control of [...this.rows.values()].flatMap(({ input, slider }) => (slider ? [input, slider] : [input]))) {
+      control.disabled = why !== "";
+      control.title = why;
     }
   }
 
@@ -119,21 +130,79 @@ export class ParameterPanel {
       onchange: () => {
         const value = numberFrom(input.value, field);
         mark(input, wrong, typeof value === "number" ? "" : `${words(parameter.name)} ${value}`);
-        if (typeof value !== "number") return;
-        const sent = this.commands.setParameter(parameter.name, value);
-        row.pending = { id: sent, value, told: row.told };
-        if (sent === null) return mark(input, wrong, "There is no connection to the simulation; nothing was sent.");
-        row.text = input.value;
-        this.asked.set(sent, parameter.name);
-        if (this.asked.size > 100) this.asked.delete(this.asked.keys().next().value!);
+        if (typeof value === "number") this.ask(row, parameter.name, value);
       },
       // What the run has told while the focus was there.
       onblur: () => { if (input.value === row.text && row.pending === null && input.value !== numberText(row.told)) this.write(row); },
     });
-    const row: Row = { input, wrong, told: parameter.value, text: input.value, pending: null };
+    const bounds = typeof minimum === "number" && typeof maximum === "number" && minimum < maximum ? [minimum, maximum] as const : null;
+    const slider = bounds && element("input", {
+      type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${words(parameter.name)}, slider`,
+      // What it would be set to stands in the input; it is sent once the slider is let go.
+      oninput: () => {
+        row.isSliding = true;
+        input.value = numberText(valueOf(Number(slider!.value) / STEPS, bounds));
+        slider!.setAttribute("aria-valuetext", input.value);
+        mark(input, wrong, "");
+      },
+      onchange: () => {
+        row.isSliding = false;
+        const value = valueOf(Number(slider!.value) / STEPS, bounds);
+        input.value = numberText(value);
+        mark(input, wrong, "");
+        this.ask(row, parameter.name, value);
+      },
+      onblur: () => {
+        const isLeft = row.isSliding;
+        row.isSliding = false;
+        if (isLeft) this.write(row);
+      },
+    });
+    const row: Row = { input, slider, isSliding: false, bounds, wrong, told: parameter.value, text: input.value, pending: null };
     this.rows.set(parameter.name, row);
-    const bounded = typeof minimum === "number" && typeof maximum === "number";
+    this.slide(row, parameter.value);
     return element("div", { class: "field" }, element("label", { for: id }, words(parameter.name),
-      bounded ? element("small", {}, `${digits(minimum, 3)} to ${digits(maximum, 3)}`) : null), input, wrong);
+      bounds ? element("small", {}, `${digits(bounds[0], 3)} to ${digits(bounds[1], 3)}`) : null), input, slider, wrong);
   }
+
+  /** Sends a value that was typed or slid to. */
+  private ask(row: Row, name: string, value: number): void {
+    this.slide(row, value);
+    const sent = this.commands.setParameter(name, value);
+    row.pending = { id: sent, value, told: row.told };
+    if (sent === null) return mark(row.input, row.wrong, "There is no connection to the simulation; nothing was sent.");
+    row.text = row.input.value;
+    this.asked.set(sent, name);
+    if (this.asked.size > 100) this.asked.delete(this.asked.keys().next().value!);
+  }
+
+  /** Puts the slider where a value is. */
+  private slide({ slider, bounds, isSliding }: Row, value: number): void {
+    if (!slider || !bounds || isSliding) return;
+    slider.value = String(Math.round(STEPS * partOf(value, bounds)));
+    slider.setAttribute("aria-valuetext", numberText(value));
+  }
+}
+
+/** Whether a hand may be on it. */
+const isHeld = ({ input, isSliding }: Row): boolean => isSliding || input === document.activeElement;
+
+type Bounds = readonly [number, number];
+const isWide = ([low, high]: Bounds): boolean => low > 0 && high > WIDE * low;
+
+/** Which part of the way from one bound to the other a value is. */
+function partOf(value: number, bounds: Bounds): number {
+  const [low, high] = isWide(bounds) ? bounds.map(Math.log) as [number, number] : bounds;
+  const within = Math.min(bounds[1], Math.max(bounds[0], value));
+  return ((isWide(bounds) ? Math.log(within) : within) - low) / (high - low);
+}
+
+/** The value at a part of the way, with no more digits than a step of the slider can mean; the bounds themselves at its ends. */
+function valueOf(part: number, bounds: Bounds): number {
+  const [low, high] = bounds;
+  if (part <= 0 || part >= 1) return part <= 0 ? low : high;
+  const value = isWide(bounds) ? low * (high / low) ** part : low + (high - low) * part;
+  const power = Math.floor(Math.log10(isWide(bounds) ? value / 100 : (high - low) / STEPS));
+  const rounded = power >= 0 ? Math.round(value / 10 ** power) * 10 ** power : Number(value.toFixed(Math.min(100, -power)));
+  return Math.min(high, Math.max(low, rounded + 0));
 }

@@ -1,7 +1,8 @@
 /** Where the slice of the chosen view lies: along which axis, and how far. The run is asked to cut elsewhere. */
 import type { Pipelines } from "../connection/pipelines";
 import type { Vector } from "../connection/protocol";
-import { element, identifier, markWrong, write } from "../dom";
+import { element, identifier, write } from "../dom";
+import { mark } from "../form/controls";
 import { digits, readNumber, whyNoNumber } from "../number";
 import { own } from "../own";
 import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
@@ -18,10 +19,13 @@ const STEPS = 200;
 export class SlicePanel implements Sliced {
   private readonly slider = element("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": "place of the slice along its normal", oninput: () => this.slide() });
   private readonly offset: HTMLInputElement = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", id: identifier("offset"), onchange: () => this.typed() });
+  private readonly wrong = element("small", { class: "wrong", hidden: true, role: "alert", id: identifier("wrong") });
   private readonly note = element("p", { class: "hint" });
   private readonly axes: HTMLButtonElement[];
   /** Where the slice of the chosen view lies, as far as is known. */
   private plane: Plane | null = null;
+  /** The slice for which something wrong was typed: it stays there, with the reason, until there is another one. */
+  private typedFor = "";
   /** Between which offsets the slider was placed. */
   private reach = "";
 
@@ -30,7 +34,7 @@ export class SlicePanel implements Sliced {
     this.axes = ["x", "y", "z"].map((name, axis) => element("button", { type: "button", class: "small", title: `Cut across ${name}`, onclick: () => this.across(axis) }, name));
     root.replaceChildren(element("h2", {}, "Slice"),
       element("div", { class: "field" }, element("span", { class: "label" }, "across"), element("div", { class: "axes", role: "group", "aria-label": "Cut across" }, ...this.axes)),
-      element("div", { class: "field" }, element("label", { for: this.offset.id }, "offset"), this.offset), this.slider, this.note);
+      element("div", { class: "field" }, element("label", { for: this.offset.id }, "offset"), this.offset, this.wrong), this.slider, this.note);
     pipelines.onChange(() => this.show());
     store.watch((state) => state.chosenView, () => this.show());
     store.watch(whyNotSteering, () => this.show());
@@ -48,7 +52,8 @@ export class SlicePanel implements Sliced {
     const size = Math.max(...plane.normal.map(Math.abs));
     this.axes.forEach((button, axis) => button.setAttribute("aria-pressed", String(plane.normal.every((part, k) => k === axis || Math.abs(part) < 1e-9 * size))));
     const offset = offsetOf(plane);
-    if (document.activeElement !== this.offset) this.offset.value = digits(offset, 5);
+    if (this.typedFor !== this.shown) mark(this.offset, this.wrong, "");
+    if (document.activeElement !== this.offset && this.wrong.hidden) this.offset.value = digits(offset, 5);
     const ends = this.ends(plane);
     if (ends) this.slider.value = String(Math.round((STEPS * (offset - ends[0])) / (ends[1] - ends[0])));
   }
@@ -59,6 +64,10 @@ export class SlicePanel implements Sliced {
     if (ends === this.reach) return;
     this.reach = ends;
     this.show();
+  }
+
+  private get shown(): string {
+    return JSON.stringify([this.store.state.chosenView, this.plane]);
   }
 
   private ends({ normal }: Plane): [number, number] | null {
@@ -83,9 +92,24 @@ export class SlicePanel implements Sliced {
   }
 
   private typed(): void {
+    const { plane } = this;
     const offset = readNumber(this.offset.value);
-    markWrong(this.offset, offset === null ? whyNoNumber(this.offset.value) : "");
-    if (this.plane && offset !== null) this.move(atOffset(this.plane, offset));
+    this.typedFor = this.shown;
+    mark(this.offset, this.wrong, offset === null ? `The offset ${whyNoNumber(this.offset.value)}.` : plane ? this.whyNoCut(plane, offset) : "");
+    if (plane && offset !== null && this.wrong.hidden) this.move(atOffset(plane, offset));
+  }
+
+  /** Why there is nothing to cut at an offset; empty where there may be something. */
+  private whyNoCut({ normal }: Plane, offset: number): string {
+    const features = this.store.state.hello?.features ?? [];
+    const seen = this.bounds();
+    // Slices alone do not tell how far the domain goes.
+    if (features.length === 0) return "";
+    const reaches = [...features.map(({ bounds }) => bounds), ...(seen ? [seen] : [])].map((box) => extent(box, normal));
+    const [low, high] = [Math.min(...reaches.map(([from]) => from)), Math.max(...reaches.map(([, to]) => to))];
+    // The ends themselves are the surface, and rounded.
+    const room = 1e-6 * (high - low);
+    return offset > low + room && offset < high - room ? "" : `Nothing is cut there: the domain goes from ${digits(low)} to ${digits(high)}.`;
   }
 
   get movable(): Plane | null {

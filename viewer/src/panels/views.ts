@@ -2,15 +2,25 @@
 import type { ViewInformation } from "../connection/protocol";
 import { element, identifier, write } from "../dom";
 import { own } from "../own";
+import { LINE, WORST, sourceOf } from "../store/pipelines";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import { sameJson, sameParts } from "../store/store";
 import type { Store } from "../store/store";
 
+/** The views that this page makes say what they are by their names. */
+const MADE = [WORST, LINE];
+
+/** What a view is of: the stage of its pipeline, for the run calls all that is no surface a slice. Of that it is told nothing until the pipelines are known. */
+function kindText(state: State, { name, kind }: ViewInformation): string {
+  const source = sourceOf(state.pipelines.known.find((pipeline) => pipeline.name === name)) ?? (kind === "surface" ? kind : "");
+  return source === name || MADE.includes(name) ? "" : source;
+}
+
 export class ViewList {
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>) {
     store.watch((state) => state.hello?.views ?? [], (views) => this.list(views), sameJson);
-    store.watch((state) => [state.looks, state.chosenView, state.coarser], () => this.show(), sameParts);
+    store.watch((state) => [state.looks, state.chosenView, state.coarser, state.pipelines.known], () => this.show(), sameParts);
   }
 
   private list(views: readonly ViewInformation[]): void {
@@ -19,7 +29,7 @@ export class ViewList {
     this.show();
   }
 
-  private row({ name, kind }: ViewInformation): HTMLElement {
+  private row({ name }: ViewInformation): HTMLElement {
     const id = identifier("view");
     const opacity = element("input", {
       type: "range", min: 0, max: 100, step: 5, "aria-label": `${name}: opacity`, title: "opacity",
@@ -30,18 +40,22 @@ export class ViewList {
     });
     const chosen = element("button", {
       type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
-    }, name, kind === name ? null : element("small", {}, kind));
+    }, name, element("small", { class: "kind" }));
     visible.setAttribute("aria-label", `${name}: shown`);
     return element("div", { class: "view", "data-view": name }, visible, chosen, opacity, element("small", { class: "precision", role: "status" }));
   }
 
   private show(): void {
-    const { looks, chosenView, coarser } = this.store.state;
+    const { hello, looks, chosenView, coarser } = this.store.state;
     for (const row of this.root.querySelectorAll<HTMLElement>("[data-view]")) {
+      const view = hello?.views.find(({ name }) => name === row.dataset.view);
+      const kind = row.querySelector<HTMLElement>(".kind")!;
+      write(kind, view ? kindText(this.store.state, view) : "");
+      kind.hidden = kind.textContent === "";
       const times = own(coarser, row.dataset.view ?? "") ?? 1;
       const precision = row.querySelector<HTMLElement>(".precision")!;
       precision.hidden = times <= 1;
-      write(precision, times <= 1 ? "" : `slow connection: values within ${times} times the error`);
+      write(precision, times <= 1 ? "" : `within ${times} times the error asked for: this page falls behind the run`);
       const look = own(looks, row.dataset.view ?? "");
       if (!look) continue;
       row.querySelector<HTMLInputElement>('input[type="checkbox"]')!.checked = look.visible;

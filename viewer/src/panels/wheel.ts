@@ -5,16 +5,22 @@ import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { capital, isSteering, titleOf } from "../store/run";
 import type { State } from "../store/state";
+import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 
 /** The least time between two signs of being there, in milliseconds. */
 const SIGN_PERIOD = 10000;
+/** For how long it is said that an answer is waited for, in milliseconds: one who keeps the wheel does not say so. */
+const WAITING = 60000;
 
 export class WheelPanel {
   private shown = -Infinity;
+  /** The message by which the wheel was asked for last. */
+  private asked: string | null = null;
+  private waiting = 0;
 
   constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
-    part("wheel").addEventListener("click", () => commands.askToSteer());
+    part("wheel").addEventListener("click", () => { this.asked = commands.askToSteer(); });
     part("hand-over").addEventListener("click", () => this.answer((other) => ({ hand_over: { to: other } })));
     part("dismiss").addEventListener("click", () => this.answer((other) => ({ kick: { client: other } })));
     part("keep").addEventListener("click", () => this.answer(() => ({ here: {} })));
@@ -26,6 +32,21 @@ export class WheelPanel {
       if (by !== null) write(part("asked-text"), `${by} asks to steer.`);
     });
     store.watch(mayAsk, (may) => { part("wheel").hidden = !may; });
+    store.watch((state) => [state.hello?.role, state.status?.driver, mayAsk(state)], () => this.say(""), sameJson);
+  }
+
+  /** Whether this is the answer to the one who asks for the wheel and has to wait for it: nothing has gone wrong. */
+  told(id: string, text: string): boolean {
+    if (id !== this.asked) return false;
+    this.say(`${text}.`);
+    return true;
+  }
+
+  private say(text: string): void {
+    clearTimeout(this.waiting);
+    write(part("waiting"), text);
+    part("waiting").hidden = text === "";
+    if (text !== "") this.waiting = window.setTimeout(() => this.say(""), WAITING);
   }
 
   private answer(message: (other: string) => ClientMessage): void {

@@ -2,9 +2,9 @@
 import { element, markWrong, write } from "../dom";
 import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
-import { readNumber, whyNoNumber, within, words } from "../number";
+import { readNumber, whyNoNumber, words } from "../number";
 import { GREY, NO_NUMBER_TEXT, colourMap, componentNames, gradient } from "./colour";
-import { valueAt } from "./ranges";
+import { isOfOneValue, textIn, valueAt } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
 
@@ -38,8 +38,9 @@ export class ScalarBars {
     shown.typed = (range) => this.fix(bar.views, range);
     shown.name(this.describe(bar));
     shown.gaps.hidden = !bar.hasGaps;
-    const at = (i: number): string => within(valueAt(bar.range, 1 - i / (TICKS - 1), bar.look.range.logarithmic), bar.look.range.logarithmic ? [0, valueAt(bar.range, 1 - i / (TICKS - 1), true)] : bar.range);
-    ticks.forEach((tick, i) => write(tick, at(i + 1)));
+    const { logarithmic } = bar.look.range;
+    const at = (i: number): string => textIn(valueAt(bar.range, 1 - i / (TICKS - 1), logarithmic), bar.range, logarithmic);
+    ticks.forEach((tick, i) => write(tick, isOfOneValue(bar.range) ? "" : at(i + 1)));
     ends.forEach((input, i) => {
       if (document.activeElement === input) return;
       cells[i]!.write(bar.range[i]!, at(i === 0 ? TICKS - 1 : 0));

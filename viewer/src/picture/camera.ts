@@ -6,8 +6,14 @@ import type { Vector } from "../connection/protocol";
 /** The box around what is seen: the least and the largest x, then y, then z. */
 export type Box = [number, number, number, number, number, number];
 
-/** How a camera stands. */
-export interface Stand { position: Vector; focalPoint: Vector; viewUp: Vector; parallel: boolean; parallelScale: number; viewAngle: number }
+/** How a camera stands; `middle` is where in the picture its focal point is drawn, from -1 to 1, which each picture has for itself unless it is linked with another. */
+export interface Stand { position: Vector; focalPoint: Vector; viewUp: Vector; parallel: boolean; parallelScale: number; viewAngle: number; middle?: [number, number] }
+
+/** How far what lies over the picture reaches into it from each side, as parts of its width and height. */
+export interface Covered { left: number; right: number; top: number; bottom: number }
+const NOTHING: Covered = { left: 0, right: 0, top: 0, bottom: 0 };
+/** The part of the free room that the whole takes. */
+const FILLED = 0.9;
 
 export class Camera {
   /** Where it stood when `reset` had put the whole into the picture; null where it never did. */
@@ -17,10 +23,11 @@ export class Camera {
   /** Whether it was put anywhere yet. */
   isPlaced = false;
 
-  /** `box` is around what is seen; `changed` is called when it stands elsewhere, and `moved` when it follows another one. */
+  /** `box` is around what is seen; `request` is called when it stands elsewhere, and `moved` when it follows another one; `covered` is room to be left. */
   constructor(
     private readonly renderer: vtkRenderer, private readonly canvas: vtkOpenGLRenderWindow,
     private readonly box: () => Box | null, private readonly request: () => void, private readonly moved: () => void,
+    private readonly covered: () => Covered = () => NOTHING,
   ) {}
 
   private place(): string {
@@ -37,6 +44,7 @@ export class Camera {
     return {
       position: [...camera.getPosition()] as Vector, focalPoint: [...camera.getFocalPoint()] as Vector, viewUp: [...camera.getViewUp()] as Vector,
       parallel: camera.getParallelProjection(), parallelScale: camera.getParallelScale(), viewAngle: camera.getViewAngle(),
+      middle: camera.getWindowCenter().map((part) => -part || 0) as [number, number],
     };
   }
 
@@ -49,7 +57,7 @@ export class Camera {
   }
 
   set stand(stand: Stand) {
-    const { position, focalPoint, viewUp, parallel, parallelScale, viewAngle } = stand;
+    const { position, focalPoint, viewUp, parallel, parallelScale, viewAngle, middle } = stand;
     if (this.isPlaced && JSON.stringify(stand) !== JSON.stringify(this.stand)) this.moved();
     this.isPlaced = true;
     this.whole = null;
@@ -60,6 +68,7 @@ export class Camera {
     camera.setParallelProjection(parallel);
     camera.setParallelScale(parallelScale);
     camera.setViewAngle(viewAngle);
+    if (middle) camera.setWindowCenter(-middle[0], -middle[1]);
     this.renderer.resetCameraClippingRange();
     this.request();
   }
@@ -137,16 +146,26 @@ export class Camera {
     this.request();
   }
 
-  /** Moves closer until the box fills the picture: vtk.js leaves room for a sphere around it. */
+  /** Moves closer until the box fills the room that nothing lies over: vtk.js leaves room for a sphere around it, in the middle. */
   private fill(box: Box): void {
     const camera = this.renderer.getActiveCamera();
+    camera.setWindowCenter(0, 0);
+    const { left, right, top, bottom } = this.covered();
+    const room = [2 - 2 * left - 2 * right, 2 - 2 * top - 2 * bottom];
+    const [across, down] = this.seen(box);
+    const larger = Math.max((across[1] - across[0]) / room[0]!, (down[1] - down[0]) / room[1]!);
+    if (larger > 0) camera.zoom(Math.min(6, FILLED / larger));
+    // The focal point stays what the camera turns about: it is drawn elsewhere.
+    const [[west, east], [south, north]] = this.seen(box);
+    camera.setWindowCenter((west + east) / 2 - (left - right), (south + north) / 2 - (bottom - top));
+  }
+
+  /** From where to where a box is seen across the picture, and from its lower end to its upper one, of -1 to 1. */
+  private seen(box: Box): [[number, number], [number, number]] {
     const [width, height] = this.canvas.getSize();
-    let largest = 0;
-    for (let corner = 0; corner < 8; corner++) {
-      const place = this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer) as Vector;
-      largest = Math.max(largest, Math.abs(place[0] / width - 0.5), Math.abs(place[1] / height - 0.5));
-    }
-    if (largest > 0) camera.zoom(Math.min(6, 0.45 / largest));
+    const places = Array.from({ length: 8 }, (_, corner) => this.canvas.worldToDisplay(box[corner & 1]!, box[2 + ((corner >> 1) & 1)]!, box[4 + (corner >> 2)]!, this.renderer));
+    const [x, y] = [places.map((place) => (2 * place[0]) / width - 1), places.map((place) => (2 * place[1]) / height - 1)];
+    return [[Math.min(...x), Math.max(...x)], [Math.min(...y), Math.max(...y)]];
   }
 
   /** A key with the focus on the picture; returns whether it moved the camera. */

@@ -25,7 +25,7 @@ export class ChosenFaces {
   show(points: Float32Array, corners: Uint32Array): void {
     this.faces.actor.setVisibility(corners.length > 0);
     if (corners.length === 0) return;
-    this.points.setData(points as Float32Array<ArrayBuffer>, 3);
+    this.points.setData(points, 3);
     this.points.modified();
     this.faces.setTriangles(corners);
   }

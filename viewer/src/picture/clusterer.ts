@@ -58,6 +58,7 @@ export class Clusterer {
     try {
       this.started().postMessage({ points: wish.points, triangles: wish.topology.triangles, features: wish.topology.triangleFeatures });
     } catch (error) {
+      // oxlint-disable-next-line no-console -- a picture drawn whole is nothing to trouble a person with.
       console.error(error);
       this.take(null);
     }
@@ -84,4 +85,4 @@ export class Clusterer {
 }
 
 /** That of all pictures of the page. */
-export const clusterer = new Clusterer(() => new Worker(new URL("./clustering.worker.ts", import.meta.url), { type: "module" }) as unknown as ClusterWorker);
+export const clusterer = new Clusterer(() => new Worker(new URL("./clustering.worker.ts", import.meta.url), { type: "module" }));

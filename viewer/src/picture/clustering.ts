@@ -54,7 +54,9 @@ export function coarsened(cells: Uint32Array, size: 2 | 3, representatives: Uint
   for (let cell = 0; cell + size <= cells.length; cell += size) {
     const a = representatives[cells[cell]!]!, b = representatives[cells[cell + 1]!]!;
     const c = size === 3 ? representatives[cells[cell + 2]!]! : NaN;
-    if (a !== b && b !== c && c !== a) size === 3 ? kept.push(a, b, c) : kept.push(a, b);
+    if (a === b || b === c || c === a) continue;
+    if (size === 3) kept.push(a, b, c);
+    else kept.push(a, b);
   }
   let slots = 4;
   while (slots < kept.length) slots *= 2;

@@ -1,5 +1,6 @@
 /** What lies over the picture: axes, the name under the pointer, and the empty state. */
 import { part, write } from "../dom";
+import type { Covered } from "./camera";
 
 const AXIS_COLOURS = ["#ff6b6b", "#6fdc7f", "#6ea8ff"];
 const AXIS_NAMES = ["x", "y", "z"];
@@ -48,4 +49,20 @@ export function showEmpty(title: string, text: string): void {
   part("empty").hidden = title === "";
   write(part("empty-title"), title);
   write(part("empty-text"), text);
+}
+
+/** The most of the picture that is left free for what lies over it, across and down. */
+const MOST = 0.4;
+/** A picture that is narrower, such as one of two, has nothing to spare beside it. */
+const NARROW = 480;
+
+/** How much of the picture the tools at its top and the bars at its right lie over. */
+export function coveredBy(picture: HTMLElement, tools: HTMLElement, bars: HTMLElement): Covered {
+  const [box, above, beside] = [picture, tools, bars].map((element) => element.getBoundingClientRect()) as [DOMRect, DOMRect, DOMRect];
+  const part = (size: number, of: number): number => (of > 0 ? Math.min(MOST, Math.max(0, size / of)) : 0);
+  return {
+    left: 0, bottom: 0,
+    top: above.height > 0 ? part(above.bottom - box.top, box.height) : 0,
+    right: beside.width > 0 && box.width >= NARROW ? part(box.right - beside.left, box.width) : 0,
+  };
 }

@@ -6,10 +6,16 @@ import type { Marks } from "./marks";
 import type { Probe, ProbeReading } from "./probe";
 
 /** The most pins at once. */
-const PINS = 8;
+export const PINS = 8;
+
+/** A pin as it is kept while the page is loaded again: the place is found anew where it was last. */
+export interface KeptPin { name: string; view: string; point: Vector }
 
 /** `point` is where it was last, and `sought` the topology in which it was looked for last. */
-interface Pin { name: string; probe: Probe; point: Vector | null; sought: string | null; series: Set<string> }
+interface Pin { name: string; probe: Probe; point: Vector | null; sought: string | null; series: Set<string>; isNew: boolean }
+
+/** The place of a pin that has to be found yet: no triangle of any topology. */
+const nowhere = (view: string): Probe => ({ view, topology: "", triangle: 0, weights: [1, 0, 0] });
 
 /** What pins need of the picture. */
 export interface PinSource {
@@ -22,22 +28,45 @@ export class Pins {
   private pins: Pin[] = [];
   private count = 0;
 
-  /** `describe` names the field that a reading is of, and its unit. */
+  /**
+   * `describe` names the field that a reading is of, and its unit. `chosen` has a series plotted, of a pin that is new or one that is there
+   * again; `changed` is called when there are other pins.
+   */
   constructor(
     private readonly history: History, private readonly marks: Pick<Marks, "set">, private readonly source: PinSource,
-    private readonly describe: (reading: ProbeReading) => { name: string; unit: string | null }, private readonly chosen: (key: string) => void,
+    private readonly describe: (reading: ProbeReading) => { name: string; unit: string | null }, private readonly chosen: (key: string, isNew: boolean) => void,
+    private readonly changed: () => void,
   ) {}
+
+  /** The views in which there are pins. */
+  get views(): ReadonlySet<string> {
+    return new Set(this.pins.map(({ probe }) => probe.view));
+  }
 
   /** Pins a place, and has it plotted. The oldest goes where there are too many. */
   add(probe: Probe): void {
-    const pin: Pin = { name: `probe ${++this.count}`, probe, point: null, sought: null, series: new Set() };
+    const pin: Pin = { name: `probe ${++this.count}`, probe, point: null, sought: null, series: new Set(), isNew: true };
     if (this.pins.length >= PINS) this.remove(this.pins[0]!);
     this.pins.push(pin);
+    this.changed();
     this.update();
+  }
+
+  /** What is to be kept while the page is loaded again. */
+  get kept(): KeptPin[] {
+    return this.pins.flatMap(({ name, probe, point }) => (point ? [{ name, view: probe.view, point }] : []));
+  }
+
+  /** Pins again what was kept. Each is found once its view has values. */
+  restore(pins: readonly KeptPin[]): void {
+    this.pins = pins.map(({ name, view, point }) => ({ name, probe: nowhere(view), point, sought: null, series: new Set(), isNew: false }));
+    this.count = Math.max(this.count, ...pins.map(({ name }) => Number(/\d+$/.exec(name))));
+    this.changed();
   }
 
   clear(): void {
     for (const pin of [...this.pins]) this.remove(pin);
+    this.changed();
     this.update();
   }
 
@@ -61,7 +90,7 @@ export class Pins {
         taken = true;
         if (!pin.series.has(source)) {
           pin.series.add(source);
-          this.chosen(seriesKey(source, name));
+          this.chosen(seriesKey(source, name), pin.isNew);
         }
       }
       return [{ points: [reading.point], label: pin.name, kind: "probe" as const }];
@@ -82,6 +111,7 @@ export class Pins {
 
   private remove(pin: Pin): void {
     this.pins = this.pins.filter((other) => other !== pin);
-    for (const source of pin.series) this.history.remove(source);
+    // Those of a pin that is there again are older than what it has read itself.
+    for (const { source } of this.history.series) if (source.startsWith(`${pin.name}, `)) this.history.remove(source);
   }
 }

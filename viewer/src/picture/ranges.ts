@@ -1,4 +1,5 @@
 /** Which values the two ends of a colour map stand for. */
+import { digits, within } from "../number";
 
 export type Range = [number, number];
 export type RangeKind = "auto" | "over time" | "fixed";
@@ -55,6 +56,17 @@ export class Ranges {
   }
 }
 
+/** What a range of no width is made to have, in parts of its value. */
+const SPREAD = 1e-6;
+
+/** Whether a range is of one value: its ends differ for the sake of the colours alone. */
+export const isOfOneValue = ([low, high]: Range): boolean => low !== 0 && Math.abs((high - low) / (SPREAD * Math.abs(low)) - 1) < 1e-6;
+
+/** A value of a range, with the digits that tell it from others there; where all are one, with few. */
+export function textIn(value: number, range: Range, logarithmic: boolean): string {
+  return isOfOneValue(range) ? digits(value) : within(value, logarithmic ? [0, value] : range);
+}
+
 /** The same range about 0, or of positive values, and never empty. */
 function spread([low, high]: Range, { symmetric, logarithmic }: RangeChoice): Range {
   if (logarithmic) {
@@ -66,7 +78,7 @@ function spread([low, high]: Range, { symmetric, logarithmic }: RangeChoice): Ra
     const most = Math.max(Math.abs(low), Math.abs(high)) || 1e-12;
     return [-most, most];
   }
-  return high > low ? [low, high] : [low, low + Math.max(Math.abs(low) * 1e-6, 1e-12)];
+  return high > low ? [low, high] : [low, low + Math.max(Math.abs(low) * SPREAD, 1e-12)];
 }
 
 /** The value at a part of the way from the low end to the high one. */

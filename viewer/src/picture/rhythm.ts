@@ -21,7 +21,7 @@ export class Rhythm {
   /** When the picture was begun into which new values came; null where none did. */
   private begun: number | null = null;
   /** Who waits for the next picture, and whether somebody wants all in it that has come. */
-  private listeners: (() => void)[] = [];
+  private readonly listeners: (() => void)[] = [];
   private allWanted = false;
 
   /** While an interaction draws pictures by itself, `draw` is not called. */

@@ -12,7 +12,7 @@ import { Layer } from "./layer";
 import { prepareContext, releaseResources, watchContext } from "./lost-context";
 import { bounds } from "./picking";
 import { Camera } from "./camera";
-import type { Box } from "./camera";
+import type { Box, Covered } from "./camera";
 import { Detail } from "./detail";
 import { mouse } from "./mouse";
 import { Pace } from "./pace";
@@ -40,6 +40,8 @@ export interface SceneEvents {
   /** After each picture, with the directions of the axes on the screen. */
   drawn(axes: [number, number][]): void;
   trouble(message: string): void;
+  /** The room that is left for what lies over the picture; none where this is missing. */
+  covered?(): Covered;
   /** Whether the browser has taken away what draws. */
   lost(isLost: boolean): void;
 }
@@ -85,7 +87,7 @@ export class Scene {
     this.pace = new Pace(byProcessor, () => this.fit());
     this.camera = new Camera(this.renderer, this.canvas, () => this.box(), () => {
       if (!this.isPlacing) this.request();
-    }, () => this.pace.move());
+    }, () => this.pace.move(), events.covered);
     this.window.addRenderer(this.renderer);
     this.window.addView(this.canvas);
     this.canvas.setContainer(container);
@@ -168,7 +170,7 @@ export class Scene {
   onPage(point: Vector): [number, number] {
     const box = this.container.getBoundingClientRect();
     const [width, height] = this.canvas.getSize();
-    const place = this.canvas.worldToDisplay(...point, this.renderer) as Vector;
+    const place = this.canvas.worldToDisplay(...point, this.renderer);
     return [box.left + (place[0] / width) * box.width, box.top + (1 - place[1] / height) * box.height];
   }
 
@@ -288,8 +290,8 @@ export class Scene {
   /** The line through a place of the page, from the nearest depth of the picture to the farthest. */
   private ray(clientX: number, clientY: number): { origin: Vector; direction: Vector } {
     const [x, y] = this.onCanvas(clientX, clientY);
-    const near = this.canvas.displayToWorld(x, y, 0, this.renderer) as Vector;
-    const far = this.canvas.displayToWorld(x, y, 1, this.renderer) as Vector;
+    const near = this.canvas.displayToWorld(x, y, 0, this.renderer);
+    const far = this.canvas.displayToWorld(x, y, 1, this.renderer);
     return { origin: near, direction: [far[0] - near[0], far[1] - near[1], far[2] - near[2]] };
   }
 

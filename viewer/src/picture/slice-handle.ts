@@ -71,7 +71,7 @@ export class SliceHandle {
     // Seen along its normal there is nothing to drag along.
     const isShort = Math.hypot(tip[0] - from[0], tip[1] - from[1]) < 10;
     this.knob.style.display = this.shaft.style.display = isShort && !this.drag ? "none" : "";
-    this.outline.setAttribute("points", corners.map((corner) => corner!.map((part) => part.toFixed(1)).join(",")).join(" "));
+    this.outline.setAttribute("points", corners.map((corner) => corner.map((part) => part.toFixed(1)).join(",")).join(" "));
     for (const [name, value] of [["x1", from[0]], ["y1", from[1]], ["x2", tip[0]], ["y2", tip[1]]] as const) this.shaft.setAttribute(name, value.toFixed(1));
     this.knob.setAttribute("cx", tip[0].toFixed(1));
     this.knob.setAttribute("cy", tip[1].toFixed(1));

@@ -83,7 +83,7 @@ type Buffer = PointBuffer & CoarseBuffer;
 function extendBuffer(publicAPI: Buffer, model: BufferModel & CoarseModel, initialValues: object = {}): void {
   vtkOpenGLCellArrayBufferObject.extend(publicAPI, model, initialValues);
   keepPacked(publicAPI, model);
-  drawCoarsely(publicAPI, model, () => vtkOpenGLBufferObject.newInstance() as unknown as IndexBuffer);
+  drawCoarsely(publicAPI, model, () => vtkOpenGLBufferObject.newInstance());
 }
 const makeBuffer = macro.newInstance(extendBuffer as never, "tombolo.PointBuffer") as () => Buffer;
 

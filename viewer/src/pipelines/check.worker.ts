@@ -18,10 +18,14 @@ async function loaded(): Promise<Language> {
   }
 }
 
-worker.onmessage = async ({ data }) => {
+async function answer(question: PipelineQuestion): Promise<CheckAnswer> {
   try {
-    worker.postMessage((await loaded()).checkPipeline(data));
+    return (await loaded()).checkPipeline(question);
   } catch (error) {
-    worker.postMessage({ failure: error instanceof Error ? error.message : String(error) });
+    return { failure: error instanceof Error ? error.message : String(error) };
   }
+}
+
+worker.onmessage = ({ data }) => {
+  void answer(data).then((told) => worker.postMessage(told));
 };

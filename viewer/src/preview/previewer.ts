@@ -10,7 +10,7 @@ import type { PreviewState, State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { Preview } from "./preview";
-import type { PreviewShape, PreviewSurface, PreviewWorker } from "./preview";
+import type { PreviewShape, PreviewSurface } from "./preview";
 
 /** A surface with its points in the reference and in the shape that is. */
 export interface ShownPoints extends PreviewSurface { reference: Float64Array; points: Float32Array }
@@ -100,7 +100,7 @@ export class Previewer {
     if (this.preview) return this.preview;
     const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });
     this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.failWhole(String(error)));
-    this.preview = new Preview(worker as unknown as PreviewWorker, () => fetchSurface(this.address), {
+    this.preview = new Preview(worker, () => fetchSurface(this.address), {
       surface: (surface) => this.takeSurface(surface),
       shape: (shape) => this.take(shape),
       checked: (faults, isNewest) => this.judge(faults, isNewest),

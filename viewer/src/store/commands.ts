@@ -72,7 +72,7 @@ export class Commands {
     return this.ask({ parameter: { name, value } });
   }
 
-  askToSteer(): void {
-    this.send({ drive: {} });
+  askToSteer(): string | null {
+    return this.send({ drive: {} });
   }
 }

@@ -1,13 +1,16 @@
 /**
  * What the page keeps over a reload: the theme, whether the tour was seen, the person's name; and for each run of a relay by itself how views
- * look, and the dock. Nothing of the run, and no secret.
+ * look, and the dock. Of the run itself only pins and what monitors have said, no longer than the session; no secret.
  */
 import type { Theme } from "../picture/theme";
+import type { Vector } from "../connection/protocol";
+import { PINS } from "../picture/pins";
+import type { KeptPin } from "../picture/pins";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
 
 const KEY = "tombolo-page";
-/** Longer than anything that the page writes. */
+/** Longer than anything that the page writes for longer than its session. */
 const LONGEST = 200_000;
 /** The most characters of a name. */
 export const LONGEST_NAME = 40;
@@ -67,11 +70,53 @@ export class Kept {
   }
 }
 
+/** The most characters of what monitors have said. */
+export const LONGEST_HISTORY = 300_000;
+
+/**
+ * What this page keeps of one run while it is loaded again, and no longer: the pins, and what the monitors have said. It is for the storage
+ * of the session, which is that of one page.
+ */
+export class KeptRun {
+  private readonly key: string;
+
+  /** `path` tells the runs of a relay from each other. */
+  constructor(private readonly storage: Pick<Storage, "getItem" | "setItem" | "removeItem">, path: string) {
+    this.key = `tombolo-run ${path}`;
+  }
+
+  keep(pins: readonly KeptPin[], history: string | null): void {
+    try {
+      this.storage.setItem(this.key, JSON.stringify({ pins, history }));
+    } catch {
+      // As above; but nothing old is left, which would be taken for what was said last.
+      this.forget();
+    }
+  }
+
+  read(): { pins: KeptPin[]; history: string | null } {
+    // A text in a text is longer than it is: its quotes are escaped.
+    const { pins, history } = read(this.storage, this.key, 2 * LONGEST_HISTORY + LONGEST);
+    return { pins: Array.isArray(pins) ? pins.filter(isPin).slice(0, PINS) : [], history: typeof history === "string" ? history : null };
+  }
+
+  /** It was of another run. */
+  forget(): void {
+    this.storage.removeItem(this.key);
+  }
+}
+
+function isPin(value: unknown): value is KeptPin {
+  const { name, view, point } = (typeof value === "object" && value !== null ? value : {}) as Partial<Record<keyof KeptPin, unknown>>;
+  const isPoint = Array.isArray(point) && point.length === 3 && (point as Vector).every(Number.isFinite);
+  return typeof name === "string" && /^probe \d{1,9}$/.test(name) && typeof view === "string" && isPoint;
+}
+
 /** Rubbish, or what another version has written, counts as nothing. */
-function read(storage: Pick<Storage, "getItem">, key: string): { readonly [key: string]: unknown } {
+function read(storage: Pick<Storage, "getItem">, key: string, longest = LONGEST): { readonly [key: string]: unknown } {
   try {
     const text = storage.getItem(key) ?? "";
-    const parsed: unknown = text.length > LONGEST ? null : JSON.parse(text || "null");
+    const parsed: unknown = text.length > longest ? null : JSON.parse(text || "null");
     if (typeof parsed === "object" && parsed !== null) return { ...parsed };
   } catch {
     // As above.
@@ -87,6 +132,6 @@ function readPage(storage: Pick<Storage, "getItem">): Page {
 function readRun(storage: Pick<Storage, "getItem">, key: string): Run {
   const { looks, dock } = read(storage, key);
   const { open, chosen } = (typeof dock === "object" && dock !== null ? dock : {}) as { open?: unknown; chosen?: unknown };
-  const names = Array.isArray(chosen) && chosen.every((name) => typeof name === "string") ? (chosen as string[]) : null;
+  const names = Array.isArray(chosen) && chosen.every((name) => typeof name === "string") ? chosen : null;
   return { looks: readLooks(looks), dock: { open: open !== false, chosen: names } };
 }

@@ -97,10 +97,60 @@ export function withLine(pipeline: Pipeline, from: Vector, to: Vector): Pipeline
   return { ...pipeline, stages: pipeline.stages.with(at, { ...(stage as Body), probe: { ...body(stage, "probe"), line: { ...lineIn(stage), from, to } } }) };
 }
 
+/** The stage that takes something out of the mesh; null where a pipeline has none. */
+export function sourceOf(pipeline: Pipeline | undefined): string | null {
+  return SOURCES.find((name) => pipeline?.stages.some((stage) => body(stage, name))) ?? null;
+}
+
 const SOURCES = ["surface", "slice", "contour", "threshold", "clip", "probe", "streamlines", "glyphs"];
 
-/** A view of the cells that are hardly better than the worst. */
-export function worstCells({ min, mean }: QualitySummary): Pipeline {
-  const most = min + 0.03 * Math.max((mean ?? 1) - min, 1e-6);
-  return { name: WORST, every: { steps: 10 }, stages: [{ threshold: { field: QUALITY, max: most } }, { select: { fields: [QUALITY] } }, { stream: {} }] };
+/** So many of the worst cells are to be in their view, and so many at most: more would be a view of the mesh. */
+const FEWEST = 10;
+const MOST = 400;
+/** Into how many parts of a range the cells are counted, under the name of the count's monitors. */
+const PARTS = 64;
+const COUNT = "cells";
+
+/** Cells of a range of quality, as the run has counted them: those below it, and those in each part of it. */
+export interface CountedCells { low: number; high: number; below: number; parts: number[] }
+
+/** Has the cells counted whose quality lies in a range, and those below it. Nothing is streamed for it. */
+export function countCells([low, high]: readonly [number, number]): Pipeline {
+  return { name: WORST, every: { steps: 1 }, stages: [{ threshold: { field: QUALITY, max: high } },
+    { histogram: { name: COUNT, field: QUALITY, bins: PARTS, range: [low, high] } }] };
+}
+
+/** The range in which the worst cells are looked for first. */
+export function poorRange({ min, mean }: QualitySummary): [number, number] {
+  return [min, min + Math.max((mean ?? 1) - min, 1e-6 * Math.max(1, Math.abs(min)))];
+}
+
+/** What a monitor of `countCells` tells; null where it is of something else. */
+export function countedIn(values: Readonly<Record<string, number | null>>): CountedCells | null {
+  const [low, high, below] = ["lower", "upper", "below"].map((name) => values[`${COUNT}.${name}`]);
+  const parts = Array.from({ length: PARTS }, (_, i) => values[`${COUNT}.bins.${i}`]);
+  const isNumber = (value: number | null | undefined): value is number => typeof value === "number";
+  return isNumber(low) && isNumber(high) && isNumber(below) && parts.every(isNumber) ? { low, high, below, parts } : null;
+}
+
+/**
+ * Up to which quality the worst cells are shown, so that there are ten at least. Where those are too many, the range that is to be
+ * counted more finely; null for neither, where as many cells are alike.
+ */
+export function worstUpTo({ low, high, below, parts }: CountedCells): { max: number } | { range: [number, number] } | null {
+  const width = (high - low) / PARTS;
+  let cells = below;
+  const enough = parts.findIndex((part) => (cells += part) >= FEWEST);
+  // Where there are not so many at all, all of them.
+  const last = enough < 0 ? PARTS - 1 : enough;
+  const from = low + last * width;
+  // The end itself, without what rounding makes of it.
+  const to = last === PARTS - 1 ? high : low + (last + 1) * width;
+  if (cells <= MOST) return { max: to };
+  return to - from > 1e-12 * Math.max(1, Math.abs(to)) ? { range: [from, to] } : null;
+}
+
+/** A view of the worst cells, each with its own value to the last bit: by that they are told apart. */
+export function worstCells(max: number): Pipeline {
+  return { name: WORST, every: { steps: 10 }, stages: [{ threshold: { field: QUALITY, max } }, { select: { fields: [QUALITY] } }, { stream: { error: "lossless" } }] };
 }

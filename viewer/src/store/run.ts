@@ -13,7 +13,7 @@ export function runState({ connection, status, end }: State): RunState {
 /** Milliseconds by which a picture may be behind before that is said. */
 const OLD = 3000;
 
-/** How old the picture is and what was left out of it, where the link is too slow for the run; empty where it keeps up. */
+/** How old the picture is and what was left out of it, where the link or the page is too slow for the run; empty where it keeps up. */
 export function slowLink(state: State, now: number): string {
   const { frames, progress, status } = state;
   if (runState(state) !== "running" || frames.cycle === null || !status) return "";
@@ -23,11 +23,11 @@ export function slowLink(state: State, now: number): string {
   const gaps = Object.values(frames.views).flatMap((view) => view.gaps);
   const least = Math.min(...gaps, Infinity);
   const behind = status.cycle - shown;
-  // A view that is seldom sent is no sign of a slow link.
+  // A view that is seldom sent is no sign of that.
   if (age < OLD || !Number.isFinite(least) || behind < 3 * least) return "";
   const due = gaps.reduce((sum, gap) => sum + Math.round(gap / least), 0);
   const lost = due > gaps.length ? `; ${due - gaps.length} of the last ${due} frames were left out` : "";
-  return `The link is slow: the picture is ${Math.round(age / 1000)} s old, ${behind} cycles behind${lost}.`;
+  return `The picture is behind: ${Math.round(age / 1000)} s old, ${behind} cycles${lost}.`;
 }
 
 /** A viewer in words: by the name that it has given itself, which another may have too, and by that which is its own. */

@@ -7,7 +7,7 @@ class Server {
   revision = 0;
   edits: Json[] = [];
   asked: string[] = [];
-  private waiting: (() => void)[] = [];
+  private readonly waiting: (() => void)[] = [];
 
   ask = (address: string) => {
     this.asked.push(address);

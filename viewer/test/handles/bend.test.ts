@@ -39,6 +39,11 @@ describe("a bend at a control node", () => {
     expect(bent(branch().slice(0, 1), 0, [0, 0, 1], 20)).toBeNull();
   });
 
+  it("leaves where they are the nodes that only rounding would move", () => {
+    const nodes = Array.from({ length: 4 }, (_, i) => ({ place: [1e-17 * i, 0, i] as Vector, isPinned: false }));
+    expect(bent(nodes, 1, [0, 0, 1], 20)).toEqual(nodes.map(() => [0, 0, 0]));
+  });
+
   it("the other way round for an angle below 0", () => {
     const nodes = branch();
     const [up, down] = [bent(nodes, 3, [0, 1, 0], 12)!, bent(nodes, 3, [0, 1, 0], -12)!];

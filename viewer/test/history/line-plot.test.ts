@@ -44,7 +44,8 @@ describe("the line of the plot", () => {
   it("keeps the coordinates that nobody has typed, to the last bit", async () => {
     const { asked, plot } = await plotted(lineBetween([1234.56789, 1 / 3, 0.1], [2000.00001, -1e-7, 5]));
     const inputs = [...plot.body.querySelectorAll("input")];
-    expect(inputs.map(({ value }) => value)).toEqual(["1234.57", "0.333333", "0.1", "2000", "−1e−7", "5"]);
+    expect(inputs.map(({ value }) => value)).toEqual(["1234.5679", "0.3333333", "0.1", "2000", "-1e-7", "5"]);
+    expect(inputs.map(({ title }) => title)).toEqual(["1234.56789", String(1 / 3), "", "2000.00001", "", ""]);
     inputs[2]!.value = "0.2";
     inputs[2]!.dispatchEvent(new Event("change"));
     expect(asked).toEqual([{ pipelines: { set: [lineBetween([1234.56789, 1 / 3, 0.2], [2000.00001, -1e-7, 5])] } }]);

@@ -13,6 +13,7 @@ vi.mock("uplot", () => ({
     redraw = vi.fn();
     setData = vi.fn();
     setScale = vi.fn();
+    destroy = vi.fn();
     constructor(readonly options: uPlot.Options, readonly data: uPlot.AlignedData) { made.push(this); }
   },
 }));
@@ -23,6 +24,8 @@ beforeEach(() => {
   document.body.replaceChildren();
   return () => vi.unstubAllGlobals();
 });
+
+const texts = (plot: HistoryPlot, selector: string): (string | null)[] => [...plot.body.querySelectorAll(selector)].map(({ textContent }) => textContent);
 
 describe("the plots below the picture", () => {
   it("take the colours of the page at once", () => {
@@ -94,14 +97,60 @@ describe("the plots below the picture", () => {
     expect(drawn([])).toEqual([]);
   });
 
-  it("keep no pins, which are gone with the page", () => {
+  it("keep no pins, which are not of the run", () => {
     const history = new History();
     const pin = seriesKey("probe 1, pressure", "pressure"), drop = seriesKey("flow", "drop");
     for (const [source, name] of [["flow", "drop"], ["probe 1, pressure", "pressure"]] as const) history.add(source, 1, 1, { [name]: 1 });
     const kept: (readonly string[] | null)[] = [];
     const plot = new HistoryPlot(history, null, (chosen) => { kept.push(chosen); });
     plot.choose(pin);
+    document.body.append(plot.body);
     new HistoryPlot(history, [], (chosen) => { kept.push(chosen); }).choose(pin);
-    expect(kept).toEqual([[drop], null]);
+    // The monitors stay those that were chosen.
+    expect(kept).toEqual([]);
+    plot.show(true);
+    expect(made[0]!.options.series.slice(1).map(({ label }) => label)).toEqual(["drop", "pressure"]);
+    const click = (key: string): void => [...plot.body.querySelectorAll<HTMLInputElement>("input")].find(({ dataset }) => dataset.series === key)!.click();
+    click(pin);
+    expect([kept, made.at(-1)!.options.series.length]).toEqual([[], 2]);
+    click(drop);
+    expect(kept).toEqual([[]]);
+  });
+
+  it("say which pin is which, and show the same field at two of them on one axis", () => {
+    const history = new History();
+    const keys = [1, 2].map((pin) => {
+      history.add(`probe ${pin}, velocity magnitude`, 1, 1, { "velocity magnitude": pin });
+      return seriesKey(`probe ${pin}, velocity magnitude`, "velocity magnitude");
+    });
+    history.add("health", 1, 1, { "quality.min": 0.5 });
+    const plot = new HistoryPlot(history, null, () => undefined);
+    for (const key of keys) plot.choose(key);
+    plot.show(true);
+    expect(texts(plot, "tbody th")).toEqual(["quality.min", "probe 1: velocity magnitude", "probe 2: velocity magnitude"]);
+    expect(texts(plot, ".choices label").slice(0, 2)).toEqual(["probe 1: velocity magnitude", "probe 2: velocity magnitude"]);
+    const [, ...scales] = made[0]!.options.series.map(({ scale }) => scale);
+    expect([scales[1] === scales[2], scales[0] === scales[1], made[0]!.options.axes!.length]).toEqual([true, false, 3]);
+  });
+
+  it("say nothing of a difference that is but rounding, and all of one that is more under the pointer", () => {
+    const history = new History();
+    for (const [cycle, same, drop, balance] of [[1, 0.20000000000000018, 101325, 0], [2, 0.2, 101425.5, 1e-3]] as const) history.add("flow", cycle, cycle, { same, drop, balance });
+    const plot = new HistoryPlot(history, ["same", "drop", "balance"].map((name) => seriesKey("flow", name)), () => undefined);
+    plot.setMarks([{ cycle: 1, label: "Throat: height × 0.7" }]);
+    plot.show(true);
+    const last = [...plot.body.querySelectorAll<HTMLElement>("tbody td:last-child")];
+    expect(last.map(({ textContent, title }) => [textContent, title])).toEqual([["0", "unchanged"], ["+0.0992\u00a0%", "+101 (+0.0992\u00a0%)"], ["+0.001", "+0.001"]]);
+    expect(plot.body.querySelector<HTMLElement>(".table-title")!.title).toBe("cycle 2 · before: Throat: height × 0.7");
+  });
+
+  it("are calm where a value hardly changes over time", () => {
+    const history = new History();
+    for (const [cycle, drop] of [[1, 129.37729], [2, 129.37731]] as const) history.add("flow", cycle, cycle, { drop });
+    new HistoryPlot(history, null, () => undefined).show(true);
+    const [, { range }] = Object.values(made[0]!.options.scales!) as unknown as [unknown, { range: (plot: null, low: number, high: number) => [number, number] }];
+    const [low, high] = range(null, 129.37729, 129.37731);
+    expect((high - low) / 129.3773).toBeCloseTo(1e-4, 9);
+    expect(range(null, 129, 131)).toEqual([128.88, 131.12]);
   });
 });

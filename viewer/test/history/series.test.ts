@@ -33,6 +33,46 @@ describe("the history", () => {
     expect(history.table([seriesKey("a", "p")])).toEqual({ cycles: [1], times: [1], columns: [[9]] });
   });
 
+  it("is there again after a reload, with its gaps and units", () => {
+    const history = new History();
+    for (const [cycle, p] of [[1, 0.1], [2, null], [4, 3]] as const) history.add("a", cycle, cycle / 3, { p });
+    history.add("a", 5, 5 / 3, { q: 1e-300 });
+    history.add("b", 3, 1, { r: 7 });
+    history.setUnit("a", "p", "Pa");
+    const again = new History();
+    again.restore(history.kept(1000)!);
+    expect(again.series).toEqual(history.series);
+    expect(again.csv()).toBe(history.csv());
+    const keys = history.series.map(({ key }) => key);
+    expect(again.table(keys)).toEqual(history.table(keys));
+    again.add("a", 6, 2, { p: 8 });
+    expect(again.table(keys).cycles).toEqual([1, 2, 3, 4, 5, 6]);
+    for (const rubbish of ["", "null", "[1]", '[["a",[1],[1,2],[]]]', '[["a",[1],[1],[["p",null,["x"]]]]]', '[["a",[1],[1],[["p",5,[1]]]]]']) {
+      const empty = new History();
+      empty.restore(rubbish);
+      expect(empty.series, rubbish).toEqual([]);
+    }
+  });
+
+  it("is kept over a reload within its bounds: of the old values fewer", () => {
+    const history = new History();
+    const names = Array.from({ length: 40 }, (_, i) => `monitor ${i}`);
+    for (let cycle = 0; cycle < TIMES; cycle++) history.add("a", cycle, cycle, Object.fromEntries(names.map((name, i) => [name, Math.sin(cycle * i)])));
+    for (let cycle = 0; cycle < 10; cycle++) history.add("b", cycle, cycle, { p: cycle });
+    expect(history.kept(10_000_000)!.length).toBeGreaterThan(1_000_000);
+    const text = history.kept(300_000)!;
+    expect(text.length).toBeLessThanOrEqual(300_000);
+    const again = new History();
+    again.restore(text);
+    const { cycles } = again.table([seriesKey("a", names[3]!)]);
+    expect([cycles[0], cycles.at(-1), cycles.length > 200, again.series.length]).toEqual([0, TIMES - 1, true, 41]);
+    expect(again.at(seriesKey("a", names[3]!), TIMES - 1)).toBe(Math.sin(3 * (TIMES - 1)));
+    expect(again.table([seriesKey("b", "p")]).cycles.length).toBe(10);
+    // What is shown goes on with all that it had.
+    expect(history.table([seriesKey("a", names[3]!)]).cycles.length).toBe(TIMES);
+    expect(history.kept(100)).toBeNull();
+  });
+
   it("stays within its bounds, and keeps the newest and the oldest", () => {
     const history = new History();
     for (let cycle = 0; cycle < 20 * TIMES; cycle++) history.add("a", cycle, cycle, { p: cycle });

@@ -18,6 +18,9 @@ describe("the table beside a plot", () => {
     expect(said()).toEqual([["now", "1", "2"], ["before", "3", "4"]]);
     table.show([row("now", "5", "2")]);
     expect(said()).toEqual([["now", "5", "2"]]);
+    expect([...table.element.tBodies[0]!.rows[0]!.cells].map(({ title }) => title)).toEqual(["now", "", ""]);
+    table.show([{ ...row("now", "5", "2"), hint: "2.0001" }]);
+    expect(table.element.tBodies[0]!.rows[0]!.cells[2]!.title).toBe("2.0001");
     expect(table.element.querySelector<HTMLElement>(".colour")!.style.background).toBe("rgb(1, 2, 3)");
     expect(table.element.tHead!.hidden).toBe(false);
     table.show([]);

@@ -17,7 +17,7 @@ describe("the list of edits", () => {
     new EditsPanel(made.store, made.commands);
   });
   const button = (row: number, act: string): HTMLElement => document.querySelector<HTMLElement>(`#stack [data-edit="${row}"] [data-act="${act}"]`)!;
-  const rows = (): string[] => [...document.querySelectorAll("#stack .title")].map((title) => title.textContent!);
+  const rows = (): string[] => [...document.querySelectorAll("#stack .title")].map((title) => title.textContent);
 
   it("says what each does, in words, or its name", () => {
     expect(rows()).toEqual(["Wall: moved by 1 along x", "Wall: moved by 2 along x", "nudge"]);

@@ -31,6 +31,16 @@ describe("the look of a view", () => {
     expect([made.store.state.looks.cut!.field, components.hidden]).toEqual(["q", true]);
   });
 
+  it("names the colour maps by what they are for, with no more beside a name than there is room for", () => {
+    const groups = [...select("colours").querySelectorAll("optgroup")].map(({ label, children }) => [label, children.length > 0]);
+    expect(groups).toEqual([["sequential", true], ["diverging", true], ["cyclic", true]]);
+    for (const label of ["colours", "range", "edges"]) for (const text of options(select(label))) expect(text.length).toBeLessThan(14);
+    const map = select("colours");
+    map.value = "cividis";
+    map.dispatchEvent(new Event("change"));
+    expect(made.store.state.looks.cut!.map).toBe("cividis");
+  });
+
   it("names a field that was asked for and has not come yet", () => {
     made.store.dispatch({ type: "look", view: "cut", look: { field: "scaled_jacobian" } });
     expect(options(select("field"))).toEqual(["velocity", "mesh quality (not in this view) -", "none"]);

@@ -21,6 +21,16 @@ describe("the newest values of monitors", () => {
     expect([shown(), document.getElementById("monitors-panel")!.hidden]).toEqual([[], true]);
   });
 
+  it("have their units where they are known, also once that is said later", () => {
+    panel.keep([{ pipeline: "flow", name: "drop", unit: "Pa" }, { pipeline: "flow", name: "mass" }]);
+    told("flow", "mass", "drop");
+    expect(shown()).toEqual(["mass0", "drop1\u00a0Pa"]);
+    panel.keep([{ pipeline: "flow", name: "drop", unit: null }, { pipeline: "flow", name: "mass", unit: "kg/s" }]);
+    expect(shown()).toEqual(["mass0\u00a0kg/s", "drop1"]);
+    panel.update({ pipeline: "flow", cycle: 2, values: { mass: null } });
+    expect(shown()[0]).toBe("mass–");
+  });
+
   it("are a hundred at most, and those stay up to date", () => {
     const names = Array.from({ length: 100 }, (_, i) => `n${i}`);
     told("a", ...names);

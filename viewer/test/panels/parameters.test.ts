@@ -114,8 +114,43 @@ describe("the parameters", () => {
     expect(input().value).toBe("12");
   });
 
+  const slider = (): HTMLInputElement => document.querySelector<HTMLInputElement>('#parameters input[type="range"]')!;
+  const slideTo = (part: number, ...events: string[]): void => {
+    slider().value = String(part * Number(slider().max));
+    for (const event of events) slider().dispatchEvent(new Event(event));
+  };
+
+  it("have a slider between their bounds, which sends once it is let go", () => {
+    expect(slider().getAttribute("aria-label")).toBe("inflow speed, slider");
+    expect(Number(slider().value) / Number(slider().max)).toBe(0.5);
+    slideTo(0.3, "input");
+    expect([input().value, slider().getAttribute("aria-valuetext"), made.sent]).toEqual(["6", "6", []]);
+    // Nothing is written under the hand.
+    made.greet({ parameters: [inflow(14)] });
+    expect([input().value, slider().value]).toEqual(["6", "60"]);
+    slideTo(0.25, "input", "change");
+    expect(made.sent).toMatchObject([{ parameter: { name: "inflow_speed", value: 5 } }]);
+    panel.refused(String(made.sent[0]!.id), "the journal cannot be written");
+    expect(wrong().textContent).toBe("the journal cannot be written");
+    // It goes where the number goes.
+    set("20");
+    expect(slider().value).toBe(slider().max);
+    made.greet({ parameters: [inflow(0)] });
+    expect([input().value, slider().value]).toEqual(["0", "0"]);
+  });
+
+  it("have a slider by powers of ten where the bounds are far apart, and none without bounds", () => {
+    made.greet({ parameters: [{ name: "viscosity", value: 0.01, minimum: 1e-4, maximum: 1 }] });
+    expect(Number(slider().value) / Number(slider().max)).toBe(0.5);
+    slideTo(0.25, "change");
+    slideTo(1, "change");
+    expect(made.sent.map(({ parameter }) => (parameter as { value: number }).value)).toEqual([0.001, 1]);
+    made.greet({ parameters: [{ name: "viscosity", value: 0.01, minimum: 0 }] });
+    expect(document.querySelectorAll("#parameters input").length).toBe(1);
+  });
+
   it("are off for a watcher, with the reason", () => {
     made.greet({ role: "watcher", may_drive: false });
-    expect([input().disabled, input().title]).toEqual([true, "This link is for watching only."]);
+    for (const control of [input(), slider()]) expect([control.disabled, control.title]).toEqual([true, "This link is for watching only."]);
   });
 });

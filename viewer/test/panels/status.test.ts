@@ -7,12 +7,13 @@ import { openDocument } from "./document";
 
 describe("the bar", () => {
   let made: ReturnType<typeof page>;
+  let wheel: WheelPanel;
   const at = (id: string): HTMLButtonElement => document.getElementById(id) as HTMLButtonElement;
   beforeEach(() => {
     openDocument();
     made = page();
     new StatusBar(made.store, made.commands);
-    new WheelPanel(made.store, made.commands);
+    wheel = new WheelPanel(made.store, made.commands);
   });
 
   it("says that a run has ended, and how, and offers nothing more", () => {
@@ -75,5 +76,34 @@ describe("the bar", () => {
     expect(made.sent.at(-1)).toMatchObject({ drive: {} });
     made.greet({ role: "watcher", may_drive: false });
     expect(at("wheel").hidden).toBe(true);
+  });
+
+  it("says quietly that an answer is waited for, for a minute or until somebody else steers", () => {
+    vi.useFakeTimers();
+    try {
+      const now = (driver: string): void => made.store.dispatch({ type: "status", status: { ...STATUS, driver }, at: 0 });
+      const ask = (): boolean => {
+        at("wheel").click();
+        return wheel.told(String(made.sent.at(-1)!.id), "c9 has the wheel and is told that you ask for it");
+      };
+      const waiting = (): string | null => (at("waiting").hidden ? null : at("waiting").textContent);
+      made.greet({ role: "watcher" });
+      now("c9");
+      expect([wheel.told("another", "no"), waiting()]).toEqual([false, null]);
+      expect([ask(), waiting(), made.store.state.refusal]).toEqual([true, "c9 has the wheel and is told that you ask for it.", ""]);
+      vi.advanceTimersByTime(59_000);
+      now("c9");
+      expect(waiting()).not.toBeNull();
+      vi.advanceTimersByTime(2000);
+      expect(waiting()).toBeNull();
+      ask();
+      now("c4");
+      expect(waiting()).toBeNull();
+      ask();
+      made.greet({ role: "driver" });
+      expect(waiting()).toBeNull();
+    } finally {
+      vi.useRealTimers();
+    }
   });
 });

@@ -33,6 +33,15 @@ describe("a scalar bar", () => {
     expect([high.value, high.getAttribute("aria-invalid")]).toEqual(["1", "false"]);
   });
 
+  it("has few digits where all values are one", () => {
+    show([0.2153846, 0.2153846 * (1 + 1e-6)]);
+    expect([...root().querySelectorAll("input")].map(({ value }) => value)).toEqual(["0.2154", "0.2154"]);
+    expect([...root().querySelectorAll("li")].map(({ textContent }) => textContent)).toEqual(["", "", "", "", "", ""]);
+    // Values that differ are told apart, as near as they are.
+    show([101325.01, 101325.09]);
+    expect([...root().querySelectorAll("input")].map(({ value }) => value)).toEqual(["101325.09", "101325.01"]);
+  });
+
   it("says what grey is where some values are no numbers", () => {
     const legend = (): HTMLElement => root().querySelector(".gaps")!;
     show([0, 1]);

@@ -49,7 +49,7 @@ describe("marks over the picture", () => {
     const history = new History();
     const asked: string[] = [];
     let reading: ProbeReading | null = { point: [1, 2, 3], feature: 0, field: "p", component: -1, value: 5, cycle: 1, time: 0.1 };
-    const pins = new Pins(history, marks, { read: () => reading, near: () => null, topologyOf: () => "1" }, ({ field }) => ({ name: field ?? "", unit: "Pa" }), (key) => asked.push(key));
+    const pins = new Pins(history, marks, { read: () => reading, near: () => null, topologyOf: () => "1" }, ({ field }) => ({ name: field ?? "", unit: "Pa" }), (key) => asked.push(key), () => undefined);
     expect(pins.update()).toBe(false);
     pins.add({ view: "v", topology: "1", triangle: 0, weights: [1, 0, 0] });
     reading = { ...reading, value: 6, cycle: 2 };

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { extremes, scalars } from "../../src/picture/colour";
-import { digits, readNumber, seconds, whyNoNumber, within } from "../../src/number";
+import { digits, fitting, pointed, readNumber, seconds, whyNoNumber, within } from "../../src/number";
 import { bounds, featureEdges } from "../../src/picture/picking";
 
 // Two parallel unit squares, at z = 0 and z = 1, of two triangles each.
@@ -49,6 +49,20 @@ describe("numbers", () => {
     expect([2e-5, 0.0613, 2.5, 300].map((value) => seconds(value))).toEqual(["20\u00a0µs", "61.3\u00a0ms", "2.5\u00a0s", "5\u00a0min"]);
     expect(within(7.7e-5, [0, 18])).toBe("0");
     expect(within(101325.25, [101325, 101326])).toBe("101325.25");
+  });
+  it("are seen whole in an input, with their power of ten", () => {
+    expect([0.1 + 0.2, 0.00000382516, -1.409523e-19, 123456789.5, -0.000123456, 1234.56789, 42, 1e21, -1.234e-300, -99999999.6].map((value) => fitting(value, 8))).toEqual(
+      ["0.3", "3.825e-6", "-1.4e-19", "1.2346e8", "-1.23e-4", "1234.568", "42", "1e+21", "-1e-300", "-1e8"]);
+    for (const value of [Math.PI * 1e-7, -Math.E * 1e-8, 1e15 / 7, -Math.PI * 1e200]) {
+      expect(fitting(value, 7).length, fitting(value, 7)).toBeLessThanOrEqual(7);
+      expect(Math.abs(readNumber(fitting(value, 8))! / value - 1)).toBeLessThan(0.05);
+    }
+  });
+  it("that are pointed at have no more digits than the size of the model gives them", () => {
+    expect(pointed([-1.4095e-19, 0.30000001192092896, 1.25], 2.8)).toEqual([0, 0.3, 1.25]);
+    expect(pointed([-1.4095e-19, 3.82516e-6, 1e-13], 4e-5)).toEqual([0, 3.82516e-6, 0]);
+    expect(pointed([123456789.4, -0.2, 7e8], 2e9)).toEqual([123457000, 0, 7e8]);
+    expect(pointed([1e-19, 2, 3], 0)).toEqual([1e-19, 2, 3]);
   });
   it("are read back", () => {
     expect([" 1.5 ", "−2", "1,5", ".5", "1e-3", "x", "", "1e999"].map(readNumber)).toEqual([1.5, -2, 1.5, 0.5, 0.001, null, null, null]);

@@ -32,7 +32,7 @@ describe("pipelines in words", () => {
 
   it("are there to begin with, as the run takes them", () => {
     for (const { key, make } of TEMPLATES) {
-      const text = pretty(make(run) as Json);
+      const text = pretty(make(run));
       expect(check(text).errors.length, `${key}: ${text}`).toBe(key === "empty" ? 1 : 0);
     }
     const made = Object.fromEntries(TEMPLATES.map(({ key, make }) => [key, JSON.stringify(make(run).stages)]));

@@ -455,7 +455,7 @@ describe("who steers, and how the run stands", () => {
     expect(whyNotSteering(store.state)).toBe("The run has ended.");
   });
 
-  it("says that the link is slow only where it is", () => {
+  it("says that the picture is behind, and not why, only where it is", () => {
     const { store } = page();
     const at = (seconds: number, shown: number | null): string => {
       store.dispatch({ type: "status", status: { ...STATUS, cycle: 100 + 10 * seconds }, at: 1000 * seconds });
@@ -465,7 +465,7 @@ describe("who steers, and how the run stands", () => {
     for (let second = 1; second < 10; second++) expect(at(second, 100 + 10 * second)).toBe("");
     // Frames come late, and every third of them alone.
     expect(at(11, 190)).toBe("");
-    expect(at(14, 210)).toMatch(/^The link is slow: the picture is 3 s old, 30 cycles behind; 1 of the last \d+ frames were left out\.$/);
+    expect(at(14, 210)).toMatch(/^The picture is behind: 3 s old, 30 cycles; 1 of the last \d+ frames were left out\.$/);
     // One that comes seldom is not late.
     const seldom = page().store;
     seldom.dispatch({ type: "frame", view: "cut", cycle: 0 });
