@@ -16,6 +16,8 @@ use tombolo::{Adaptor, deform::shapes::box_of_tets, pipelines::encode::Decoder};
 
 /// How soon one with a right secret gets in, on however busy a machine.
 const SOON: Duration = Duration::from_secs(5);
+/// How soon most get in, also while others want to keep them out.
+const SOON_MOSTLY: Duration = Duration::from_secs(1);
 
 fn address(adaptor: &Adaptor) -> SocketAddr {
     adaptor.address().expect("a server")
@@ -60,15 +62,32 @@ fn watching_url(adaptor: &Adaptor) -> String {
     link.replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1)
 }
 
-/// One with a right secret gets in soon, and the solver steps.
-fn all_is_well(solver: &mut Solver) {
+/// One with a right secret gets in soon, after so long, and the solver steps.
+fn all_is_well(solver: &mut Solver) -> Duration {
     let begun = Instant::now();
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
-    assert!(begun.elapsed() < SOON, "it took {:?}", begun.elapsed());
+    let taken = begun.elapsed();
+    assert!(taken < SOON, "it took {taken:?}");
     solver.steps(3);
     assert!(solver.is_at_reference() && !solver.stopped);
     drop(viewer);
+    taken
+}
+
+/// How long a step of the solver takes at the median.
+fn median_step(solver: &mut Solver) -> Duration {
+    median((0..101).map(|_| {
+        let begun = Instant::now();
+        solver.step();
+        begun.elapsed()
+    }))
+}
+
+fn median(times: impl IntoIterator<Item = Duration>) -> Duration {
+    let mut times: Vec<Duration> = times.into_iter().collect();
+    times.sort();
+    times[times.len() / 2]
 }
 
 #[test]
@@ -308,7 +327,7 @@ fn foreign_pages_and_names_get_nothing_with_the_right_secret_either() {
 #[test]
 fn a_flood_of_connections_keeps_nobody_out() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
-    solver.step();
+    let in_peace = median_step(&mut solver);
     let to = address(&solver.adaptor);
     let connect = move || TcpStream::connect(to).ok();
     // Some say nothing, some half a request, some a byte now and then, as long as they are let.
@@ -346,13 +365,20 @@ fn a_flood_of_connections_keeps_nobody_out() {
             }
         }
     });
+    let mut taken = Vec::new();
     for _ in 0..5 {
-        all_is_well(&mut solver);
+        taken.push(all_is_well(&mut solver));
         let begun = Instant::now();
         let link = path_of(&solver.adaptor.browser_link().unwrap());
         assert_eq!(head(&get(&solver.adaptor, &link, "")).0, "303");
+        taken.push(begun.elapsed());
         assert!(begun.elapsed() < SOON);
     }
+    let flooded = median_step(&mut solver);
+    println!("let in after {taken:?}, a step takes {flooded:?}, in peace {in_peace:?}");
+    assert!(median(taken.iter().copied()) < SOON_MOSTLY, "{taken:?}");
+    // A machine whose cores are all taken is slow by itself; waiting for a connection would be far slower.
+    assert!(flooded < 10 * in_peace + Duration::from_millis(5), "{flooded:?}, not {in_peace:?}");
     is_over.store(true, std::sync::atomic::Ordering::Relaxed);
     flood.join().expect("no panic");
     // Those that said too little are let go by themselves too.
@@ -463,10 +489,20 @@ fn bytes_of_all_kinds_are_refused() {
     all_is_well(&mut solver);
 }
 
-/// At 100 kB/s a reader is a few frames behind at most, and is let be as long as it reads.
+/// However little a link carries, what comes over it is at most two frames old when it sets out,
+/// and who reads it is let be as long as it reads.
 #[test]
 fn a_slow_reader_sees_new_frames_and_is_not_cut() {
-    const RATE: usize = 100_000;
+    read_slowly(100_000);
+}
+
+#[test]
+fn a_reader_of_300_kilobytes_a_second_sees_new_frames_and_is_not_cut() {
+    read_slowly(300_000);
+}
+
+/// Reads `rate` bytes a second for 25 seconds.
+fn read_slowly(rate: usize) {
     let config = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
         {"name": "boundary", "stages": [{"surface": {}}, {"stream": {"error": {"absolute": 1e-9}}}]}]}"#;
     let mesh = box_of_tets([30; 3], [0.0; 3], [1.0; 3]);
@@ -491,11 +527,11 @@ fn a_slow_reader_sees_new_frames_and_is_not_cut() {
     // How long each frame is, and how old it was when it had come.
     let mut seen: Vec<(usize, Duration)> = Vec::new();
     let mut decoder = Decoder::new();
-    while begun.elapsed() < Duration::from_secs(40) {
+    while begun.elapsed() < Duration::from_secs(25) {
         stepped.push(Instant::now());
         solver.step();
         std::thread::sleep(Duration::from_millis(5));
-        let allowed = (begun.elapsed().as_secs_f64() * RATE as f64) as usize;
+        let allowed = (begun.elapsed().as_secs_f64() * rate as f64) as usize;
         let mut buffer = vec![0; allowed.saturating_sub(taken).min(1 << 16)];
         match stream.read(&mut buffer) {
             Ok(0) => assert!(buffer.is_empty(), "it was cut after {:?}", begun.elapsed()),
@@ -516,11 +552,18 @@ fn a_slow_reader_sees_new_frames_and_is_not_cut() {
     // The first is long, and shows what follows it late.
     let later = &seen[seen.len() / 4..];
     let oldest = later.iter().map(|(_, age)| *age).max().expect("frames");
+    let mostly = median(later.iter().map(|(_, age)| *age));
     let size = later.iter().map(|(size, _)| size).sum::<usize>() / later.len();
+    let frame = Duration::from_secs_f64(size as f64 / rate as f64);
     let (frames, steps) = (seen.len(), stepped.len());
-    println!("{taken} bytes, {frames} frames of {size}, {steps} steps, the oldest {oldest:?}");
-    assert!(taken > 15 * RATE, "the link was not full: {taken} bytes in frames of {size}");
-    assert!(oldest < Duration::from_secs(4), "{oldest:?}");
+    println!(
+        "{taken} bytes, {frames} frames of {size}, {steps} steps; a frame takes {frame:?}; \
+         they are {mostly:?} old, the oldest {oldest:?}"
+    );
+    assert!(taken > 15 * rate, "the link was not full: {taken} bytes in frames of {size}");
+    // Two frames, and its own way; now and then a busy machine is late itself.
+    assert!(mostly < 3 * frame + Duration::from_millis(100), "{mostly:?}, a frame takes {frame:?}");
+    assert!(oldest < 3 * frame + Duration::from_secs(2), "{oldest:?}, a frame takes {frame:?}");
 }
 
 /// Takes the first whole message of a server from the bytes, without the head of the answer.

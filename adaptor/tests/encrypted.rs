@@ -63,9 +63,11 @@ fn a_run_is_steered_through_tls_by_those_who_know_its_certificate() {
     assert!(run.link.to_string().starts_with("https://127.0.0.1:"), "{:?}", run.link);
     steer(&run.link);
     // Neither another certificate's fingerprint nor one that nobody has signed.
-    for fingerprint in [format!("#sha256={}", "0".repeat(64)), String::new()] {
-        let error = connect(&with_fingerprint(&run.link, &fingerprint)).err().expect("refused");
+    let another = format!("#sha256={}", "0".repeat(64));
+    for (fingerprint, words) in [(another.as_str(), "another fingerprint"), ("", "certificate")] {
+        let error = connect(&with_fingerprint(&run.link, fingerprint)).err().expect("refused");
         assert!(matches!(error, ClientError::Certificate { .. }), "{error}");
+        assert!(error.to_string().contains(words), "{error}");
     }
     // Those who do not encrypt are told that, and nothing else.
     let plain = run.link.to_string().replacen("https://", "http://", 1).parse().expect("a link");
@@ -118,6 +120,17 @@ fn a_socket_at_a_path_is_its_owners_alone_and_goes_with_the_run() {
     assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
     assert_eq!(run.link.socket_path(), Some(Path::new(&path)));
     steer(&run.link);
+    // What it prints for a browser says how a browser gets there.
+    let printed = std::process::Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args(["link", &run.link.to_string()])
+        .output()
+        .expect("the program runs");
+    let (address, advice) =
+        (String::from_utf8_lossy(&printed.stdout), String::from_utf8_lossy(&printed.stderr));
+    let (socket, query) = address.trim_end().split_once('?').expect("a link with a key");
+    assert_eq!(socket, format!("unix:{}", path.display()));
+    assert!(advice.contains(&format!("ssh -N -L 7070:{} HOST", path.display())), "{advice}");
+    assert!(advice.contains(&format!("http://127.0.0.1:7070/?{query} ")), "{advice}");
     // A secret is asked for here too.
     let mut stream = UnixStream::connect(&path).expect("connected");
     stream.write_all(b"GET /pipelines HTTP/1.0\r\nHost: localhost\r\n\r\n").expect("sent");

@@ -4,7 +4,7 @@ mod tls;
 
 use std::{io, sync::Arc, time::Duration};
 
-use rustls::{InvalidMessage, pki_types::ServerName};
+use rustls::{CertificateError, InvalidMessage, pki_types::ServerName};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::TcpStream,
@@ -56,6 +56,13 @@ fn not_agreed(error: &io::Error) -> DialError {
         Some(rustls::Error::InvalidMessage(InvalidMessage::InvalidContentType)) => {
             DialError::NotEncrypted
         }
+        // What is said where a fingerprint is expected and another is found.
+        Some(rustls::Error::InvalidCertificate(
+            CertificateError::ApplicationVerificationFailure,
+        )) => DialError::Certificate(
+            "it has another fingerprint; the link is that of another run, or somebody else answers there"
+                .into(),
+        ),
         None if is_end(error) => DialError::HungUp,
         _ => DialError::Certificate(error.to_string()),
     }

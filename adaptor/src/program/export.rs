@@ -95,6 +95,9 @@ struct Table {
 /// Rows of a table that are kept until all columns are known.
 const ROWS: usize = 4 << 20;
 
+/// Views that are named where the one that is asked for is none of them.
+const NAMED: usize = 40;
+
 /// Writes files of a recording: VTK and CSV where nothing else is asked for.
 pub(crate) fn export(options: &Options) -> Result<(), Failure> {
     let mut recording = Recording::open(&options.file)?;
@@ -107,6 +110,7 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
     let mut tables: BTreeMap<String, Table> = BTreeMap::new();
     let mut undecoded = 0_usize;
     let mut greetings = 0_usize;
+    let mut others = BTreeSet::new();
     let mut take = |recorded: RecordedMessage| -> Result<(), Failure> {
         match recorded {
             RecordedMessage::Frame { bytes, .. } if vtk || options.png => {
@@ -119,6 +123,8 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
                     let view = views.entry(frame.view.clone()).or_default();
                     view.go_on(&frame, greetings, &mut names);
                     view.take(frame, options, vtk)?;
+                } else if others.len() < NAMED && !others.contains(&frame.view) {
+                    others.insert(frame.view.clone());
                 }
             }
             RecordedMessage::Text(text) if begins_run(&text) => greetings += 1,
@@ -136,6 +142,11 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
         if outcome.is_ok() || is_text {
             outcome = outcome.and(take(recorded.message));
         }
+    }
+    if let (Some(name), true, Ok(())) = (&options.view, views.is_empty(), &outcome)
+        && (vtk || options.png)
+    {
+        return Err(unknown(name, &others));
     }
     let mut names = Names::default();
     for (pipeline, table) in &tables {
@@ -156,12 +167,17 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
         let lost = recording.lost_bytes();
         say(format!("{undecoded} frames and {lost} bytes could not be read"))?;
     }
-    match (&options.view, views.is_empty()) {
-        (Some(name), true) if vtk || options.png => {
-            Err(Failure::Wrong(format!("there is no view `{name}` in the recording")))
-        }
-        _ => Ok(()),
-    }
+    Ok(())
+}
+
+/// The error where no frame is of the view that is asked for; `others` are the views that there are.
+fn unknown(name: &str, others: &BTreeSet<String>) -> Failure {
+    let others: Vec<_> = others.iter().map(|other| format!("`{other}`")).collect();
+    let known = match others.as_slice() {
+        [] => "it has none".to_owned(),
+        others => format!("it has {}", others.join(", ")),
+    };
+    Failure::Wrong(format!("there is no view `{name}` in the recording: {known}"))
 }
 
 fn unwritten(path: &Path, error: &std::io::Error) -> Failure {

@@ -137,7 +137,18 @@ impl Connect {
                 Ok((socket, attached)) => {
                     let (run, name) = (self.run.as_deref(), &attached.name);
                     let address = &self.relay;
-                    tracing::info!(run, %name, %address, "this run is {name} at the relay {address}");
+                    if reported.is_empty() {
+                        tracing::info!(run, %name, %address, "this run is {name} at the relay {address}");
+                    } else {
+                        // Whoever was told of the trouble is told of its end.
+                        tracing::warn!(
+                            run,
+                            %name,
+                            %address,
+                            "the relay {address} is reached again, where this run is {name}"
+                        );
+                        reported.clear();
+                    }
                     let is_new = self.connected(&attached);
                     if is_new {
                         renamed();
@@ -150,7 +161,6 @@ impl Connect {
             lock(&self.state).is_connected = false;
             if was_connected {
                 pause = FIRST_PAUSE;
-                reported.clear();
             }
             if is_new(&mut reported, &reason) {
                 let (run, address) = (self.run.as_deref(), &self.relay);

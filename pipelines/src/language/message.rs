@@ -56,11 +56,13 @@ pub enum Wheel {
 /// assert_eq!((id.as_deref(), message), (Some("c1-7"), Ok(Message::Command(Command::Pause {}))));
 /// let (id, message) = parse_message(r#"{"id": "c1-8", "puase": {}}"#);
 /// assert!(id.is_some() && message.is_err_and(|error| error.suggestion.as_deref() == Some("pause")));
+/// let (id, message) = parse_message(r#"{"id": "c1-9", "parameter": {"name": "a", "value": 1e999}}"#);
+/// assert!(id.as_deref() == Some("c1-9") && message.is_err());
 /// ```
 pub fn parse_message(text: &str) -> (Option<String>, Result<Message, LanguageError>) {
     let mut document = match Document::read(text, "message") {
         Ok(document) => document,
-        Err(error) => return (None, Err(error)),
+        Err(error) => return (id_of_unread(text), Err(error)),
     };
     let id = match take_id(&mut document) {
         Ok(id) => id,
@@ -69,14 +71,23 @@ pub fn parse_message(text: &str) -> (Option<String>, Result<Message, LanguageErr
     (id, message(&document))
 }
 
+/// The id of a message that is JSON and yet cannot be read, such as one with a number beyond range.
+fn id_of_unread(text: &str) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Named {
+        id: String,
+    }
+    serde_json::from_str::<Named>(text).ok().map(|named| named.id).filter(|id| is_id(id))
+}
+
+fn is_id(id: &str) -> bool {
+    !id.is_empty() && id.chars().count() <= ID && !id.chars().any(char::is_control)
+}
+
 fn take_id(document: &mut Document<'_>) -> Result<Option<String>, LanguageError> {
     let Some(member) = document.root.member("id") else { return Ok(None) };
     let id = match &member.node.value {
-        Value::String(id)
-            if !id.is_empty() && id.chars().count() <= ID && !id.chars().any(char::is_control) =>
-        {
-            id.clone()
-        }
+        Value::String(id) if is_id(id) => id.clone(),
         _ => {
             let message = format!("expected a text of 1 to {ID} visible characters");
             return Err(document.locate(Problem::new(message).within("id")));

@@ -34,5 +34,13 @@ pub(crate) fn link(options: &Options) -> Result<(), Failure> {
     if options.target.json {
         return say(json!({"link": {"for": rights, "address": address}}));
     }
-    say(address)
+    say(&address)?;
+    if let Some(rest) = address.strip_prefix("unix:") {
+        let (socket, query) = rest.split_once('?').unwrap_or((rest, ""));
+        eprintln!(
+            "tombolo: no browser opens a socket; `ssh -N -L 7070:{socket} HOST` brings it to a port of another machine, where \
+             http://127.0.0.1:7070/?{query} opens it"
+        );
+    }
+    Ok(())
 }

@@ -124,6 +124,7 @@ pub(crate) fn forecast(options: &ForecastOptions) -> Result<(), Failure> {
                     _ => Ok(()),
                 };
             }
+            Event::Lost { reason } => eprintln!("tombolo: connection lost: {reason}"),
             event => refused(event, &id)?,
         }
     }
@@ -204,6 +205,12 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
                 Some(report) => report,
                 None => continue,
             },
+            Event::Lost { reason } => {
+                eprintln!(
+                    "tombolo: connection lost ({reason}); it is made again, and the run keeps orders that it has taken"
+                );
+                continue;
+            }
             event => {
                 refused(event, &id)?;
                 continue;
