@@ -207,17 +207,13 @@ watchPointer(part("scene"), scene, selection, {
     const reading = probe && scene.read(probe);
     return reading ? readingText(reading, fieldTitle(reading.field, reading.component), unitOf(reading.field)) : "";
   },
-  clicked: (x, y) => {
-    if (notes.choosing) {
+  tool: () => {
+    const tool = notes.choosing ? notes : [ruler, line].find(({ active }) => active);
+    return tool ? (x, y) => {
       const place = placeAt(x, y);
-      if (place) notes.take(place);
-      return true;
-    }
-    const measuring = [ruler, line].find(({ active }) => active);
-    if (!measuring) return false;
-    const place = placeAt(x, y);
-    if (place) measuring.take(place);
-    return true;
+      if (place) tool.take(place);
+      return place !== null;
+    } : null;
   },
 });
 
@@ -366,7 +362,9 @@ function takeMessage(message: ServerMessage): void {
       return store.dispatch({ type: "end", end: message.body });
     case "error": {
       const { id, message: text } = message.body;
+      const changed = pipelines.changedBy(id);
       if (pipelines.answered(id)) void pipelines.reload();
+      if (changed === WORST) worst.refused();
       if (id && id === store.state.pipelines.asked?.id) return store.dispatch({ type: "pipelines refused", id, text });
       if (id && (forecasts.refused(id, text) || parameters.refused(id, text) || people.refused(id, text) || wheel.told(id, text) || notes.refused(id, text))) return;
       store.dispatch({ type: "refused", id: id ?? null, text });
@@ -404,13 +402,17 @@ function remember({ back }: Hello): void {
   isRemembered = true;
   // Only the run that this page was connected to before knows it by that.
   if (!back || knownIdentity()?.back !== back) return keptRun.forget();
-  const { pins: known, history: said } = keptRun.read();
+  const { pins: known, history: said, isWorstOwn } = keptRun.read();
   if (said !== null) monitored.restore(said);
   pins.restore(known);
+  worst.restore(isWorstOwn);
   history.update();
   dock.update();
 }
-window.addEventListener("pagehide", () => { if (isRemembered) keptRun.keep(pins.kept, monitored.kept(LONGEST_HISTORY)); });
+window.addEventListener("pagehide", () => {
+  worst.leave();
+  if (isRemembered) keptRun.keep({ pins: pins.kept, history: monitored.kept(LONGEST_HISTORY), isWorstOwn: worst.kept });
+});
 
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;

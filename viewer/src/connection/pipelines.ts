@@ -13,7 +13,7 @@ export class Pipelines {
   /** The same with what is wanted here. */
   private known: readonly Pipeline[] = [];
   private changes = -1;
-  private underway: { id: string; name: string } | null = null;
+  private underway: { id: string; name: string; message: ClientMessage } | null = null;
   /** What is to be sent next, by the pipeline that it is of: a wish takes the place of an older one for the same pipeline alone. */
   private readonly wishes = new Map<string, ClientMessage>();
   /** What was set here last of each pipeline, as long as the run has not answered: until then it counts for more than what the run has. */
@@ -68,7 +68,19 @@ export class Pipelines {
   }
 
   remove(name: string): void {
+    // A second removal would be refused, for there is nothing left to remove.
+    if (this.underway?.name === name && isRemoval(this.underway.message) && !this.wishes.has(name)) return;
     if (this.send(name, { pipelines: { remove: [name] } })) this.wanted.delete(name);
+  }
+
+  /** The pipeline that a change on its way is of; null where it is no change from here. */
+  changedBy(id: string | null | undefined): string | null {
+    return id && id === this.underway?.id ? this.underway.name : null;
+  }
+
+  /** Whether a change of a pipeline was asked for and is not answered yet. */
+  isOnItsWay(name: string): boolean {
+    return this.underway?.name === name || this.wishes.has(name);
   }
 
   /** A change has been made or refused; says whether it was one from here. */
@@ -102,10 +114,6 @@ export class Pipelines {
     for (const listener of this.listeners) listener();
   }
 
-  private isOnItsWay(name: string): boolean {
-    return this.underway?.name === name || this.wishes.has(name);
-  }
-
   /** Sends a change, or keeps it until that on its way is answered; says whether there is a connection. */
   private send(name: string, message: ClientMessage): boolean {
     if (this.underway !== null) {
@@ -113,10 +121,12 @@ export class Pipelines {
       return true;
     }
     const id = this.ask(message);
-    if (id !== null) this.underway = { id, name };
+    if (id !== null) this.underway = { id, name, message };
     return id !== null;
   }
 }
+
+const isRemoval = (message: ClientMessage): boolean => "pipelines" in message && "remove" in (message.pipelines as object);
 
 /** The pipelines with one in the place of that of its name, or behind them. */
 const replaced = (pipelines: readonly Pipeline[], by: Pipeline): Pipeline[] =>

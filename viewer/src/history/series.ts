@@ -120,7 +120,7 @@ export class History {
     // At first by what a number takes at most, so that not much is written in vain.
     for (let room = longest / LONGEST_NUMBER; thinTo(sources, room); room /= 2) {
       const text = JSON.stringify(sources.map(({ name, cycles, times, columns }): KeptSource => [name, cycles, times, [...columns].map(([of, values]) =>
-        [of, this.list.get(seriesKey(name, of))?.unit ?? null, values.map((value) => (value === undefined ? UNSAID : value))])]));
+        [of, this.list.get(seriesKey(name, of))?.unit ?? null, this.isOfMonitor(seriesKey(name, of)), values.map((value) => (value === undefined ? UNSAID : value))])]));
       if (text.length <= longest) return text;
     }
     return null;
@@ -130,14 +130,22 @@ export class History {
   restore(text: string): void {
     for (const [source, cycles, times, columns] of readKept(text)) {
       cycles.forEach((cycle, row) => {
-        const said = columns.flatMap(([name, , values]): [string, number | null][] => {
+        const said = columns.flatMap(([name, , , values]): [string, number | null][] => {
           const value = values[row];
           return value === UNSAID || value === undefined ? [] : [[name, value]];
         });
         this.add(source, cycle, times[row]!, Object.fromEntries(said));
       });
       for (const [name, unit] of columns) this.setUnit(source, name, unit);
+      // Those that the run has no more make room for others, as they would have done without the reload.
+      const monitors = columns.flatMap(([name, , isOfMonitor]) => (isOfMonitor ? [seriesKey(source, name)] : []));
+      this.monitors = new Set([...this.monitors, ...monitors]);
     }
+  }
+
+  /** Whether a series is of a monitor, also of one that is no more, and not of a pinned place. */
+  private isOfMonitor(key: string): boolean {
+    return this.monitors.has(key) || this.ended.has(key);
   }
 
   /** All that is kept, as comma-separated values: cycle, time, then a column for each series. */
@@ -156,8 +164,8 @@ const LONGEST_NUMBER = 20;
 /** Stands for what was not said, which JSON does not know. */
 const UNSAID = false;
 
-/** A source as it is kept: its name, cycles and times, and for each series name, unit and values. */
-type KeptSource = [string, number[], number[], [string, string | null, (number | null | typeof UNSAID)[]][]];
+/** A source as it is kept: its name, cycles and times, and for each series name, unit, whether it is of a monitor, and values. */
+type KeptSource = [string, number[], number[], [string, string | null, boolean, (number | null | typeof UNSAID)[]][]];
 
 function readKept(text: string): KeptSource[] {
   const isText = (value: unknown): boolean => typeof value === "string";
@@ -166,8 +174,8 @@ function readKept(text: string): KeptSource[] {
     const [name, cycles, times, columns] = Array.isArray(value) ? value as unknown[] : [];
     if (!isText(name) || !Array.isArray(cycles) || !Array.isArray(columns)) return false;
     return [cycles, times].every((column) => isColumn(column, cycles.length, Number.isFinite)) && columns.every((column) => {
-      const [of, unit, values] = Array.isArray(column) ? column as unknown[] : [];
-      return isText(of) && (unit === null || isText(unit)) && isColumn(values, cycles.length, (said) => said === null || said === UNSAID || Number.isFinite(said));
+      const [of, unit, isOfMonitor, values] = Array.isArray(column) ? column as unknown[] : [];
+      return isText(of) && (unit === null || isText(unit)) && typeof isOfMonitor === "boolean" && isColumn(values, cycles.length, (said) => said === null || said === UNSAID || Number.isFinite(said));
     });
   };
   try {

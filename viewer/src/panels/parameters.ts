@@ -22,6 +22,8 @@ interface Row {
   bounds: Bounds | null;
   /** Whether a hand is on the slider, so that nothing is written under it. */
   isSliding: boolean;
+  /** Where the slider was before the hand came. */
+  placed: string;
   wrong: HTMLElement;
   /** The value that the run has told last. */
   told: number;
@@ -112,6 +114,8 @@ export class ParameterPanel {
   }
 
   private allow(why: string): void {
+    // What is slid now could not be sent.
+    if (why !== "") for (const row of this.rows.values()) this.leave(row);
     for (const control of [...this.rows.values()].flatMap(({ input, slider }) => (slider ? [input, slider] : [input]))) {
       control.disabled = why !== "";
       control.title = why;
@@ -135,7 +139,8 @@ export class ParameterPanel {
       // What the run has told while the focus was there.
       onblur: () => { if (input.value === row.text && row.pending === null && input.value !== numberText(row.told)) this.write(row); },
     });
-    const bounds = typeof minimum === "number" && typeof maximum === "number" && minimum < maximum ? [minimum, maximum] as const : null;
+    // Bounds so far apart that the way between them is no number leave a slider no steps.
+    const bounds = typeof minimum === "number" && typeof maximum === "number" && minimum < maximum && Number.isFinite(maximum - minimum) ? [minimum, maximum] as const : null;
     const slider = bounds && element("input", {
       type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${words(parameter.name)}, slider`,
       // What it would be set to stands in the input; it is sent once the slider is let go.
@@ -147,18 +152,20 @@ export class ParameterPanel {
       },
       onchange: () => {
         row.isSliding = false;
+        row.placed = slider!.value;
         const value = valueOf(Number(slider!.value) / STEPS, bounds);
         input.value = numberText(value);
         mark(input, wrong, "");
         this.ask(row, parameter.name, value);
       },
-      onblur: () => {
-        const isLeft = row.isSliding;
-        row.isSliding = false;
-        if (isLeft) this.write(row);
-      },
+      onblur: () => this.leave(row),
+      onpointercancel: () => this.leave(row),
+      onpointerup: () => letGo(),
+      onkeyup: () => letGo(),
     });
-    const row: Row = { input, slider, isSliding: false, bounds, wrong, told: parameter.value, text: input.value, pending: null };
+    // Let go where it began it has changed nothing, and the browser tells no change. Elsewhere that comes, and sends it.
+    const letGo = (): void => { if (slider?.value === row.placed) this.leave(row); };
+    const row: Row = { input, slider, isSliding: false, placed: slider?.value ?? "", bounds, wrong, told: parameter.value, text: input.value, pending: null };
     this.rows.set(parameter.name, row);
     this.slide(row, parameter.value);
     return element("div", { class: "field" }, element("label", { for: id }, words(parameter.name),
@@ -176,10 +183,20 @@ export class ParameterPanel {
     if (this.asked.size > 100) this.asked.delete(this.asked.keys().next().value!);
   }
 
+  /** No hand is on the slider any more: what was not sent gives way to what was sent before, or else to what the run has. */
+  private leave(row: Row): void {
+    if (!row.isSliding) return;
+    row.isSliding = false;
+    if (!row.pending?.id) return this.write(row);
+    row.input.value = row.text;
+    this.slide(row, row.pending.value);
+  }
+
   /** Puts the slider where a value is. */
-  private slide({ slider, bounds, isSliding }: Row, value: number): void {
+  private slide(row: Row, value: number): void {
+    const { slider, bounds, isSliding } = row;
     if (!slider || !bounds || isSliding) return;
-    slider.value = String(Math.round(STEPS * partOf(value, bounds)));
+    slider.value = row.placed = String(Math.round(STEPS * partOf(value, bounds)));
     slider.setAttribute("aria-valuetext", numberText(value));
   }
 }

@@ -4,12 +4,14 @@ import type { Scene } from "./scene";
 import type { Selection } from "../store/selection";
 
 const CLICK_DISTANCE = 4;
+/** What is said beside the pointer where a tool waits for a place and a click has met none. */
+const MISSED = "That click met nothing: click on the model.";
 
 export interface PointerListener {
   /** What stands beside the pointer below the name of the feature; empty for nothing. */
   reading(clientX: number, clientY: number): string;
-  /** A click at a place of the page; true where it was meant for something else than a feature. */
-  clicked(clientX: number, clientY: number): boolean;
+  /** The tool that clicks are meant for, in place of a feature: takes one, and says whether it has met anything. Null where there is none. */
+  tool(): ((clientX: number, clientY: number) => boolean) | null;
 }
 
 export function watchPointer(stage: HTMLElement, scene: Scene, selection: Selection, listener: PointerListener): void {
@@ -17,6 +19,8 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
   let dragging = false;
   let last: PointerEvent | null = null;
   let scheduled = false;
+  /** Whether the last click has met nothing, and the tool still waits for another. */
+  let missed = false;
 
   const hover = (): void => {
     scheduled = false;
@@ -24,7 +28,8 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
     const feature = scene.featureAt(last.clientX, last.clientY);
     selection.hovered = feature;
     const role = feature ? selection.get(feature) : null;
-    const lines = [feature ? `${feature}${role ? ` · ${role}` : ""}` : "", listener.reading(last.clientX, last.clientY)].filter((line) => line !== "");
+    missed &&= listener.tool() !== null;
+    const lines = [missed ? MISSED : "", feature ? `${feature}${role ? ` · ${role}` : ""}` : "", listener.reading(last.clientX, last.clientY)].filter((line) => line !== "");
     showTip(lines.length > 0 ? lines.join("\n") : null, last.clientX, last.clientY);
     stage.style.cursor = feature ? "pointer" : "";
   };
@@ -44,21 +49,32 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
     schedule();
   });
   stage.addEventListener("pointerdown", (event) => {
-    if (event.button === 0) down = { x: event.clientX, y: event.clientY };
+    if (event.button !== 0) return;
+    down = { x: event.clientX, y: event.clientY };
+    if (missed) showTip(null, 0, 0);
+    missed = false;
   });
   window.addEventListener("pointerup", (event) => {
     const clicked = down !== null && !dragging && event.button === 0;
     down = null;
     dragging = false;
-    if (!clicked || listener.clicked(event.clientX, event.clientY)) return;
+    if (!clicked) return;
+    const tool = listener.tool();
+    if (tool) {
+      missed = !tool(event.clientX, event.clientY);
+      last = event;
+      // A miss at once: a finger that is lifted is not there any more.
+      return missed ? hover() : schedule();
+    }
     const feature = scene.featureAt(event.clientX, event.clientY);
     if (feature) selection.toggle(feature, event.shiftKey ? "fixed" : "handle");
     last = event;
     schedule();
   });
-  stage.addEventListener("pointerleave", () => {
+  stage.addEventListener("pointerleave", (event) => {
     last = null;
     selection.hovered = null;
-    showTip(null, 0, 0);
+    // A finger leaves with each click, and what is said of that stays.
+    if (!missed || event.pointerType !== "touch") showTip(null, 0, 0);
   });
 }

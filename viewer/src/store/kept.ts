@@ -70,12 +70,14 @@ export class Kept {
   }
 }
 
+/** What is kept of a run: the pins, what monitors have said, null for nothing, and whether the pipeline of the worst cells is of this page. */
+export interface KeptOfRun { pins: readonly KeptPin[]; history: string | null; isWorstOwn: boolean }
+
 /** The most characters of what monitors have said. */
 export const LONGEST_HISTORY = 300_000;
 
 /**
- * What this page keeps of one run while it is loaded again, and no longer: the pins, and what the monitors have said. It is for the storage
- * of the session, which is that of one page.
+ * What this page keeps of one run while it is loaded again, and no longer. It is for the storage of the session, which is that of one page.
  */
 export class KeptRun {
   private readonly key: string;
@@ -85,19 +87,22 @@ export class KeptRun {
     this.key = `tombolo-run ${path}`;
   }
 
-  keep(pins: readonly KeptPin[], history: string | null): void {
+  keep(kept: KeptOfRun): void {
     try {
-      this.storage.setItem(this.key, JSON.stringify({ pins, history }));
+      this.storage.setItem(this.key, JSON.stringify(kept));
     } catch {
       // As above; but nothing old is left, which would be taken for what was said last.
       this.forget();
     }
   }
 
-  read(): { pins: KeptPin[]; history: string | null } {
+  read(): KeptOfRun {
     // A text in a text is longer than it is: its quotes are escaped.
-    const { pins, history } = read(this.storage, this.key, 2 * LONGEST_HISTORY + LONGEST);
-    return { pins: Array.isArray(pins) ? pins.filter(isPin).slice(0, PINS) : [], history: typeof history === "string" ? history : null };
+    const { pins, history, isWorstOwn } = read(this.storage, this.key, 2 * LONGEST_HISTORY + LONGEST);
+    return {
+      pins: Array.isArray(pins) ? pins.filter(isPin).slice(0, PINS) : [], history: typeof history === "string" ? history : null,
+      isWorstOwn: isWorstOwn === true,
+    };
   }
 
   /** It was of another run. */

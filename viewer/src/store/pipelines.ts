@@ -1,5 +1,5 @@
 /** What the viewer changes in pipelines: where a slice lies, the quality of cells as a field, a view of the worst cells. Pure functions. */
-import type { Json, QualitySummary, Vector } from "../connection/protocol";
+import type { Hello, Json, QualitySummary, Vector } from "../connection/protocol";
 
 export interface Pipeline { [key: string]: Json; name: string; stages: Json[] }
 export interface Plane { origin: Vector; normal: Vector }
@@ -118,6 +118,11 @@ export interface CountedCells { low: number; high: number; below: number; parts:
 export function countCells([low, high]: readonly [number, number]): Pipeline {
   return { name: WORST, every: { steps: 1 }, stages: [{ threshold: { field: QUALITY, max: high } },
     { histogram: { name: COUNT, field: QUALITY, bins: PARTS, range: [low, high] } }] };
+}
+
+/** Whether the run has the pipeline of `countCells`. */
+export function isCounted(hello: Hello | null): boolean {
+  return hello?.monitors?.some(({ pipeline, name }) => pipeline === WORST && name === `${COUNT}.below`) === true;
 }
 
 /** The range in which the worst cells are looked for first. */

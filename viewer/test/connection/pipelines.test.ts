@@ -47,6 +47,24 @@ describe("changes of pipelines", () => {
     expect(run.asked).toEqual([pipeline(1), pipeline(4), pipeline(5, "other")].map((one) => ({ pipelines: { set: [one] } })));
   });
 
+  it("say of which pipeline they are, and remove nothing twice", () => {
+    const { run, pipelines } = made();
+    pipelines.set(pipeline(1));
+    expect([pipelines.changedBy("id 1"), pipelines.changedBy("id 2"), pipelines.changedBy(null), pipelines.isOnItsWay("cut"), pipelines.isOnItsWay("other")])
+      .toEqual(["cut", null, null, true, false]);
+    pipelines.remove("cut");
+    pipelines.answered("id 1");
+    pipelines.remove("cut");
+    pipelines.answered("id 2");
+    expect([run.asked.slice(1), pipelines.isOnItsWay("cut")]).toEqual([[{ pipelines: { remove: ["cut"] } }], false]);
+    // What is set in between is to be removed as well.
+    pipelines.remove("cut");
+    pipelines.set(pipeline(2));
+    pipelines.remove("cut");
+    pipelines.answered("id 3");
+    expect(run.asked.slice(2)).toEqual([1, 2].map(() => ({ pipelines: { remove: ["cut"] } })));
+  });
+
   it("do not outlive the connection: what the run has is asked for anew", async () => {
     const { run, pipelines } = made();
     let shown = 0;

@@ -47,7 +47,7 @@ describe("the history", () => {
     expect(again.table(keys)).toEqual(history.table(keys));
     again.add("a", 6, 2, { p: 8 });
     expect(again.table(keys).cycles).toEqual([1, 2, 3, 4, 5, 6]);
-    for (const rubbish of ["", "null", "[1]", '[["a",[1],[1,2],[]]]', '[["a",[1],[1],[["p",null,["x"]]]]]', '[["a",[1],[1],[["p",5,[1]]]]]']) {
+    for (const rubbish of ["", "null", "[1]", '[["a",[1],[1,2],[]]]', '[["a",[1],[1],[["p",null,true,["x"]]]]]', '[["a",[1],[1],[["p",5,true,[1]]]]]', '[["a",[1],[1],[["p",null,1,[1]]]]]']) {
       const empty = new History();
       empty.restore(rubbish);
       expect(empty.series, rubbish).toEqual([]);
@@ -104,6 +104,22 @@ describe("the history", () => {
     history.keep(keys.slice(2));
     history.add("new", 3, 3, { p: 2, q: 3, r: 4 });
     expect(history.series.some(({ source }) => source === "s2")).toBe(true);
+  });
+
+  it("makes room for new monitors after a reload too, at no pinned place's cost", () => {
+    const history = new History();
+    history.add("probe 1, p", 0, 0, { p: 1 });
+    const keys = Array.from({ length: SERIES - 1 }, (_, i) => seriesKey(`s${i}`, "p"));
+    history.keep(keys);
+    for (let i = 0; i < SERIES - 1; i++) history.add(`s${i}`, 0, 0, { p: 1 });
+    // The first is of a monitor that is no more by then.
+    history.keep(keys.slice(1));
+    const again = new History();
+    again.restore(history.kept(100_000)!);
+    again.keep(keys.slice(2));
+    again.add("new", 1, 1, { p: 2, q: 3, r: 4 });
+    expect(again.series.slice(-2).map(({ key }) => key)).toEqual([seriesKey("new", "p"), seriesKey("new", "q")]);
+    expect([again.series.length, again.series[0]!.source]).toEqual([SERIES, "probe 1, p"]);
   });
 
   it("is written as a table, with what has commas quoted", () => {

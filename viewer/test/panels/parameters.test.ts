@@ -116,7 +116,7 @@ describe("the parameters", () => {
 
   const slider = (): HTMLInputElement => document.querySelector<HTMLInputElement>('#parameters input[type="range"]')!;
   const slideTo = (part: number, ...events: string[]): void => {
-    slider().value = String(part * Number(slider().max));
+    slider().value = String(Math.round(part * Number(slider().max)));
     for (const event of events) slider().dispatchEvent(new Event(event));
   };
 
@@ -147,6 +147,38 @@ describe("the parameters", () => {
     expect(made.sent.map(({ parameter }) => (parameter as { value: number }).value)).toEqual([0.001, 1]);
     made.greet({ parameters: [{ name: "viscosity", value: 0.01, minimum: 0 }] });
     expect(document.querySelectorAll("#parameters input").length).toBe(1);
+  });
+
+  it("have none where the way from one bound to the other is no number", () => {
+    made.greet({ parameters: [{ name: "source", value: 1, minimum: -1e308, maximum: 1e308 }] });
+    expect([document.querySelectorAll('#parameters input[type="range"]').length, document.querySelectorAll("#parameters input").length]).toEqual([0, 1]);
+  });
+
+  it("follow the simulation again once the slider is let go where it began, by pointer or key, or left", () => {
+    let value = 10;
+    for (const end of ["pointerup", "keyup", "pointercancel", "blur"]) {
+      const began = Number(slider().value) / Number(slider().max);
+      slideTo(0.75, "input");
+      slideTo(end === "blur" || end === "pointercancel" ? 0.75 : began, "input", end);
+      expect(input().value, end).toBe(String(value));
+      made.greet({ parameters: [inflow(++value)] });
+      expect([input().value, slider().value], end).toEqual([String(value), String(10 * value)]);
+    }
+    // Let go elsewhere it sends where it is, also where it hears of the pointer first.
+    slideTo(0.25, "input", "pointerup", "change");
+    expect(made.sent).toMatchObject([{ parameter: { name: "inflow_speed", value: 5 } }]);
+    // Back where it was sent from: what is on its way stays.
+    slideTo(0.5, "input");
+    slideTo(0.25, "input", "pointerup");
+    expect([input().value, made.sent.length]).toEqual(["5", 1]);
+  });
+
+  it("show what the run has where the wheel is lost under the hand", () => {
+    slideTo(0.75, "input");
+    made.greet({ role: "watcher", may_drive: false, parameters: [inflow(10)] });
+    expect([input().value, slider().value]).toEqual(["10", "100"]);
+    made.greet({ parameters: [inflow(12)] });
+    expect([input().value, slider().value]).toEqual(["12", "120"]);
   });
 
   it("are off for a watcher, with the reason", () => {

@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
-import type { DataFrame, TopologyFrame, Vector } from "../../src/connection/protocol";
+import type { DataFrame, Hello, TopologyFrame, Vector } from "../../src/connection/protocol";
 import { WorstCells } from "../../src/panels/quality";
 import type { Layer } from "../../src/picture/layer";
 import type { Mark } from "../../src/picture/marks";
@@ -29,6 +29,7 @@ describe("the worst cells", () => {
   let marks: readonly Mark[];
   let camera: { stand: Stand; flyTo(place: Vector): void };
   let button: HTMLButtonElement;
+  let isOnItsWay: boolean;
   const layers = new Map<string, Layer>();
   const quality = (min: number) => made.store.dispatch({ type: "status", status: { ...STATUS, quality: { min, mean: 0.8, inverted: 0 } }, at: 0 });
   /** What the newest pipeline counts, if so many cells lie in each part. */
@@ -40,12 +41,13 @@ describe("the worst cells", () => {
   const isStreamed = (): boolean => (changes.at(-1) as Pipeline).stages.some((stage) => "stream" in (stage as object));
   beforeEach(() => {
     made = page();
+    isOnItsWay = false;
     changes = [];
     marks = [];
     layers.clear();
     camera = { stand: stand(1), flyTo: ([x]) => { camera.stand = stand(x); } };
     button = document.createElement("button");
-    worst = new WorstCells(button, made.store, { set: (pipeline) => { changes.push(pipeline); }, remove: (name) => { changes.push(name); } }, { layers, camera }, { set: (_, all) => { marks = all; } });
+    worst = new WorstCells(button, made.store, { set: (pipeline) => { changes.push(pipeline); }, remove: (name) => { changes.push(name); }, isOnItsWay: () => isOnItsWay }, { layers, camera }, { set: (_, all) => { marks = all; } });
     quality(0.2);
   });
 
@@ -96,5 +98,119 @@ describe("the worst cells", () => {
     made.store.dispatch({ type: "order", status: { id: "o1", status: "applied", cycle_applied: 9 } });
     expect(threshold()).toEqual({ field: QUALITY, max: 0.8 });
     expect(isStreamed()).toBe(false);
+  });
+
+  const COUNT = { monitors: [{ pipeline: WORST, name: "cells.lower" }, { pipeline: WORST, name: "cells.below" }] };
+  const STREAM = { views: [{ name: WORST, kind: "slice" }] } as unknown as Partial<Hello>;
+  const isPressed = (): boolean => button.getAttribute("aria-pressed") === "true";
+  const connection = (state: "connected" | "reconnecting") => made.store.dispatch({ type: "connection", state, explanation: "" });
+
+  it("are given up with the wheel, and what the search has left goes with its return", () => {
+    button.click();
+    made.greet(COUNT);
+    const asked = changes.length;
+    made.greet({ ...COUNT, role: "watcher" });
+    expect(isPressed()).toBe(false);
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    expect(changes).toHaveLength(asked);
+    made.greet(COUNT);
+    expect(changes.slice(asked)).toEqual([WORST]);
+    made.greet({});
+    made.greet({ role: "watcher" });
+    made.greet({});
+    expect(changes).toHaveLength(asked + 1);
+  });
+
+  it("are given up with the connection, and what the search has left goes once the run has said that it is there", () => {
+    button.click();
+    made.greet(COUNT);
+    const asked = changes.length;
+    connection("reconnecting");
+    expect(isPressed()).toBe(false);
+    connection("connected");
+    expect(changes).toHaveLength(asked);
+    made.greet(COUNT);
+    expect(changes.slice(asked)).toEqual([WORST]);
+  });
+
+  it("stay over a loss of the connection where they are streamed, and go with their release, as soon as this page steers", () => {
+    button.click();
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    made.greet(STREAM);
+    const asked = changes.length;
+    connection("reconnecting");
+    connection("connected");
+    made.greet({ ...STREAM, role: "watcher" });
+    expect([isPressed(), changes.length]).toEqual([true, asked]);
+    button.click();
+    expect([isPressed(), changes.length]).toEqual([false, asked]);
+    made.greet(STREAM);
+    expect(changes.slice(asked)).toEqual([WORST]);
+  });
+
+  it("stay where another page has had them streamed meanwhile", () => {
+    button.click();
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    made.greet(STREAM);
+    made.greet({ ...STREAM, role: "watcher" });
+    button.click();
+    made.greet({ ...COUNT, role: "watcher" });
+    made.greet({ ...STREAM, role: "watcher" });
+    const asked = changes.length;
+    made.greet(STREAM);
+    expect(changes).toHaveLength(asked);
+  });
+
+  it("are counted for nobody where the page that began it is gone: whoever steers removes that, and no pipeline of somebody's own", () => {
+    made.greet({ monitors: [{ pipeline: WORST, name: "mine" }] });
+    expect(changes).toEqual([]);
+    made.greet({ ...COUNT, role: "watcher" });
+    expect(changes).toEqual([]);
+    made.greet(COUNT);
+    expect(changes).toEqual([WORST]);
+  });
+
+  it("are released where the run refuses them", () => {
+    button.click();
+    isOnItsWay = true;
+    worst.refused();
+    expect(isPressed()).toBe(true);
+    isOnItsWay = false;
+    const asked = changes.length;
+    worst.refused();
+    expect([isPressed(), changes.length]).toEqual([false, asked]);
+    // What it has had before is removed.
+    button.click();
+    made.greet(COUNT);
+    worst.refused();
+    expect([isPressed(), changes.at(-1)]).toEqual([false, WORST]);
+  });
+
+  it("are released where somebody else has removed them", () => {
+    button.click();
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    made.greet(STREAM);
+    made.greet({});
+    expect(isPressed()).toBe(false);
+  });
+
+  it("are shown again after a reload, and a count is ended before", () => {
+    button.click();
+    made.greet(COUNT);
+    worst.leave();
+    expect([changes.at(-1), worst.kept]).toEqual([WORST, false]);
+    made.greet({});
+    button.click();
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    made.greet(STREAM);
+    const asked = changes.length;
+    worst.leave();
+    expect([changes.length, worst.kept]).toEqual([asked, true]);
+    const anew = document.createElement("button");
+    const again = new WorstCells(anew, made.store, { set: () => undefined, remove: (name) => { changes.push(name); }, isOnItsWay: () => false }, { layers, camera }, { set: () => undefined });
+    again.restore(true);
+    expect([anew.getAttribute("aria-pressed"), changes.length]).toEqual(["true", asked]);
+    anew.click();
+    expect(changes.at(-1)).toBe(WORST);
   });
 });
