@@ -141,7 +141,12 @@ const steps = [
     await anna.page.click('[data-camera="reset"]');
   }],
   ["notes are pinned to places, seen by all, flown to and taken away", async () => {
-    await anna.page.click("#note");
+    // One tool at a time takes clicks.
+    const pressed = () => anna.page.evaluate(() => ["ruler", "line", "note"].filter((id) => document.getElementById(id).getAttribute("aria-pressed") === "true"));
+    for (const tool of ["ruler", "note", "line", "note"]) {
+      await anna.page.click(`#${tool}`);
+      check((await pressed()).join() === tool, `${await pressed()} take clicks instead of ${tool}`);
+    }
     check(await anna.page.getAttribute("#note", "aria-pressed") === "true", "nothing says that a place is waited for");
     const [x, y] = await anna.place("throat");
     await anna.page.mouse.click(x, y);

@@ -184,10 +184,10 @@ function sayMeasuring(): void {
   part("ruler").setAttribute("aria-pressed", String(ruler.active));
   part("line").setAttribute("aria-pressed", String(line.active));
 }
-/** Switches one of the two that take clicks on or off; the other is off. */
-function measureWith(one: Ruler): void {
-  const other = one === ruler ? line : ruler;
-  if (other.active) other.toggle();
+/** Switches one of the three that take clicks on or off; the others are off. */
+function useTool(one: Ruler | NotesPanel): void {
+  for (const other of [ruler, line]) if (other !== one && other.active) other.toggle();
+  if (notes !== one && notes.choosing) notes.toggle();
   one.toggle();
   sayMeasuring();
 }
@@ -297,9 +297,9 @@ watchPictureTools(part("scene"), part("stage"), {
     if (probe) pins.add(probe);
   },
   unpin: () => pins.clear(),
-  ruler: () => measureWith(ruler),
-  line: () => measureWith(line),
-  note: () => notes.toggle(),
+  ruler: () => useTool(ruler),
+  line: () => useTool(line),
+  note: () => useTool(notes),
   movie: () => movie.toggle(),
   save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
