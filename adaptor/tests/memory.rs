@@ -7,8 +7,8 @@ use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
 use serde_json::json;
 use tombolo::Settings;
 
-/// Steps, of which `TOMBOLO_STEPS` makes more: a million take some minutes.
-const STEPS: u64 = 20_000;
+/// Steps, of which `TOMBOLO_STEPS` makes more: a million take some twenty seconds.
+const STEPS: u64 = 100_000;
 /// Steps after which a viewer comes, and after which it goes again.
 const COMES: u64 = 200;
 const STAYS: u64 = 60;
