@@ -1,10 +1,13 @@
 //! A short pass of each reader, which begins with its corpus.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
 use tombolo_fuzz::{Target, fuzz};
 
 fn passes(target: Target) {
+    let corpus =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("corpus/{}.zst", target.name()));
+    assert!(corpus.is_file(), "there is no {}", corpus.display());
     let folder = tempfile::tempdir().unwrap();
     match fuzz(target, 1, Duration::from_secs(3), folder.path(), false) {
         Ok(pass) => assert!(pass.inputs > 10 && pass.outcomes > 2, "{pass:?}"),
