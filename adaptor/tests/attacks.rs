@@ -16,7 +16,7 @@ use tombolo::{Adaptor, deform::shapes::box_of_tets, pipelines::encode::Decoder};
 
 /// How soon one with a right secret gets in, on however busy a machine.
 const SOON: Duration = Duration::from_secs(5);
-/// How soon most get in, also while others want to keep them out.
+/// How soon most of those with a right secret get in during a flood.
 const SOON_MOSTLY: Duration = Duration::from_secs(1);
 
 fn address(adaptor: &Adaptor) -> SocketAddr {
@@ -62,7 +62,8 @@ fn watching_url(adaptor: &Adaptor) -> String {
     link.replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1)
 }
 
-/// One with a right secret gets in soon, after so long, and the solver steps.
+/// Connects with a right secret, which takes less than [`SOON`], and steps the solver; returns how
+/// long the connection took.
 fn all_is_well(solver: &mut Solver) -> Duration {
     let begun = Instant::now();
     let mut viewer = Viewer::connect(&solver.adaptor);
@@ -489,8 +490,7 @@ fn bytes_of_all_kinds_are_refused() {
     all_is_well(&mut solver);
 }
 
-/// However little a link carries, what comes over it is at most two frames old when it sets out,
-/// and who reads it is let be as long as it reads.
+/// A slow link is at most two frames late, and a reader is not cut off as long as it reads.
 #[test]
 fn a_slow_reader_sees_new_frames_and_is_not_cut() {
     read_slowly(100_000);
@@ -561,7 +561,7 @@ fn read_slowly(rate: usize) {
          they are {mostly:?} old, the oldest {oldest:?}"
     );
     assert!(taken > 15 * rate, "the link was not full: {taken} bytes in frames of {size}");
-    // Two frames, and its own way; now and then a busy machine is late itself.
+    // Two frames, and the time that a frame itself takes; now and then a busy machine is late.
     assert!(mostly < 3 * frame + Duration::from_millis(100), "{mostly:?}, a frame takes {frame:?}");
     assert!(oldest < 3 * frame + Duration::from_secs(2), "{oldest:?}, a frame takes {frame:?}");
 }

@@ -120,7 +120,7 @@ fn a_socket_at_a_path_is_its_owners_alone_and_goes_with_the_run() {
     assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
     assert_eq!(run.link.socket_path(), Some(Path::new(&path)));
     steer(&run.link);
-    // What it prints for a browser says how a browser gets there.
+    // `tombolo link` prints a link with a key, and how a browser reaches a socket.
     let printed = std::process::Command::new(env!("CARGO_BIN_EXE_tombolo"))
         .args(["link", &run.link.to_string()])
         .output()

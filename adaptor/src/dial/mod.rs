@@ -56,7 +56,7 @@ fn not_agreed(error: &io::Error) -> DialError {
         Some(rustls::Error::InvalidMessage(InvalidMessage::InvalidContentType)) => {
             DialError::NotEncrypted
         }
-        // What is said where a fingerprint is expected and another is found.
+        // The verifier of pinned certificates refuses another fingerprint by this error alone.
         Some(rustls::Error::InvalidCertificate(
             CertificateError::ApplicationVerificationFailure,
         )) => DialError::Certificate(

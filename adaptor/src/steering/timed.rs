@@ -10,7 +10,7 @@ use crate::{fingerprint::hash, step::Moment};
 #[derive(Debug)]
 pub(crate) struct Timed {
     commands: Vec<TimedCommand>,
-    /// The hashes of those that were taken, also in the run before.
+    /// The hashes of the commands that were carried out, also in the run before.
     carried_out: Vec<u64>,
     /// The least of the cycles and of the times at which one is due.
     cycle: u64,
@@ -45,7 +45,7 @@ impl Timed {
         &self.commands
     }
 
-    /// The hashes of those that were taken.
+    /// The hashes of the commands that were carried out, also in the run before.
     pub(crate) fn carried_out(&self) -> &[u64] {
         &self.carried_out
     }

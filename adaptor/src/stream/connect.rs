@@ -145,7 +145,7 @@ impl Connect {
                             run,
                             %name,
                             %address,
-                            "the relay {address} is reached again, where this run is {name}"
+                            "the relay {address} is reached now, and this run is {name} there"
                         );
                         reported.clear();
                     }

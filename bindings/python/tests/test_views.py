@@ -168,7 +168,7 @@ def test_the_views_that_are_chosen_are_those_that_come(run, solver):
     while (frame := next(frames).data).cycle < left_out + 50:
         assert frame.name == "skin" or frame.cycle <= left_out
     run.choose_views()
-    # At first the run may have that of before alone; newer ones follow.
+    # The first frame may be the newest that the run had made before; later ones follow.
     assert len(run.wait_for_view("midplane", after=left_out, timeout=30).triangles)
 
     # A run that is paused has made no frame since: the newest is sent again.

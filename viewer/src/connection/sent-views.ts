@@ -11,7 +11,7 @@ import type { Store } from "../store/store";
 const MOST_NAMES = 256;
 const MOST_BYTES = 16384;
 
-/** Of these views panels tell whether or not they are in the picture: they are made by this page, and small. */
+/** Views that panels need also where the picture hides them; this page has them made, and they are small. */
 const PANELS: ReadonlySet<string> = new Set([LINE, WORST]);
 
 type Source = Pick<State, "hello" | "looks" | "chosenView">;

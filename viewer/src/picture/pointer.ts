@@ -10,7 +10,7 @@ const MISSED = "That click met nothing: click on the model.";
 export interface PointerListener {
   /** What stands beside the pointer below the name of the feature; empty for nothing. */
   reading(clientX: number, clientY: number): string;
-  /** The tool that clicks are meant for, in place of a feature: takes one, and says whether it has met anything. Null where there is none. */
+  /** The tool that takes clicks in place of features: called with a place of the page, it returns whether that met the model. Null where none is on. */
   tool(): ((clientX: number, clientY: number) => boolean) | null;
 }
 

@@ -1,6 +1,7 @@
 /**
  * What the page keeps over a reload: the theme, whether the tour was seen, the person's name; and for each run of a relay by itself how views
- * look, and the dock. Of the run itself only pins and what monitors have said, no longer than the session; no secret.
+ * look, and the dock. Of the run itself only pins, what monitors have said and whether
+ * this page has had the worst cells shown, no longer than the session; no secret.
  */
 import type { Theme } from "../picture/theme";
 import type { Vector } from "../connection/protocol";

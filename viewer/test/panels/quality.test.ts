@@ -102,6 +102,12 @@ describe("the worst cells", () => {
 
   const COUNT = { monitors: [{ pipeline: WORST, name: "cells.lower" }, { pipeline: WORST, name: "cells.below" }] };
   const STREAM = { views: [{ name: WORST, kind: "slice" }] } as unknown as Partial<Hello>;
+  /** Has the worst cells shown: counted, then streamed. */
+  const show = (): void => {
+    button.click();
+    worst.take(counted((part) => (part === 0 ? 20 : 0)));
+    made.greet(STREAM);
+  };
   const isPressed = (): boolean => button.getAttribute("aria-pressed") === "true";
   const connection = (state: "connected" | "reconnecting") => made.store.dispatch({ type: "connection", state, explanation: "" });
 
@@ -134,9 +140,7 @@ describe("the worst cells", () => {
   });
 
   it("stay over a loss of the connection where they are streamed, and go with their release, as soon as this page steers", () => {
-    button.click();
-    worst.take(counted((part) => (part === 0 ? 20 : 0)));
-    made.greet(STREAM);
+    show();
     const asked = changes.length;
     connection("reconnecting");
     connection("connected");
@@ -149,9 +153,7 @@ describe("the worst cells", () => {
   });
 
   it("stay where another page has had them streamed meanwhile", () => {
-    button.click();
-    worst.take(counted((part) => (part === 0 ? 20 : 0)));
-    made.greet(STREAM);
+    show();
     made.greet({ ...STREAM, role: "watcher" });
     button.click();
     made.greet({ ...COUNT, role: "watcher" });
@@ -187,9 +189,7 @@ describe("the worst cells", () => {
   });
 
   it("are released where somebody else has removed them", () => {
-    button.click();
-    worst.take(counted((part) => (part === 0 ? 20 : 0)));
-    made.greet(STREAM);
+    show();
     made.greet({});
     expect(isPressed()).toBe(false);
   });
@@ -200,9 +200,7 @@ describe("the worst cells", () => {
     worst.leave();
     expect([changes.at(-1), worst.kept]).toEqual([WORST, false]);
     made.greet({});
-    button.click();
-    worst.take(counted((part) => (part === 0 ? 20 : 0)));
-    made.greet(STREAM);
+    show();
     const asked = changes.length;
     worst.leave();
     expect([changes.length, worst.kept]).toEqual([asked, true]);
