@@ -3,9 +3,12 @@
 
 mod common;
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::{Duration, Instant},
 };
 
 use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
@@ -203,6 +206,10 @@ fn a_stop_of_a_paused_run_begins_no_order() {
     assert!(order.reason.as_deref().unwrap().contains("while it was paused"), "{order:?}");
 }
 
+/// How long the end may take whatever is under way: two seconds for shapes and as many for the last
+/// frames, as docs/operations.md says, and a slow machine's own.
+const END: Duration = Duration::from_secs(10);
+
 #[test]
 fn a_stop_does_not_wait_for_shapes() {
     let mut solver = solver();
@@ -212,8 +219,10 @@ fn a_stop_does_not_wait_for_shapes() {
     viewer.send(&json!({"id": "next", "order": squeeze(0.2)}));
     viewer.wait_for("order", has_status("next", "accepted"));
     viewer.send(&json!({"id": "stop", "stop": {}}));
+    let asked = Instant::now();
     solver.step_until("the stop", |solver| solver.stopped);
     let report = solver.finish();
+    assert!(asked.elapsed() < END, "the run went on for {:?}", asked.elapsed());
     // Neither was carried out, and both say why.
     for order in &report.orders {
         assert_eq!(order.status, OrderStatus::Rejected, "{order:?}");
@@ -221,6 +230,28 @@ fn a_stop_does_not_wait_for_shapes() {
         assert!(reason.contains("given up") || reason.contains("the run ended"), "{reason}");
     }
     assert_eq!(report.orders.len(), 2);
+}
+
+/// A forecast that nobody wants to know any more is given up, before it has begun or in its midst, and
+/// not answered; the shapes of an order that has been given are found in spite of it.
+#[test]
+fn a_forecast_is_withdrawn() {
+    let mut solver = solver();
+    let mut viewer = driven(&mut solver);
+    for pause in [0, 300, 1000] {
+        viewer.send(&json!({"id": "long", "forecast": long(0.3)}));
+        std::thread::sleep(Duration::from_millis(pause));
+        viewer.send(&json!({"withdraw_forecast": {}}));
+        viewer.send(&json!({"id": "short", "forecast": squeeze(0.1)}));
+        let told = viewer.wait_for("forecast", |told| !told.is_null());
+        assert_eq!((&told["id"], &told["order"]["outcome"]), (&json!("short"), &json!("applied")));
+        let refused = viewer.look_for("error", Duration::from_millis(1), |_| true);
+        assert_eq!(refused, None);
+    }
+    viewer.send(&json!({"id": "given", "order": squeeze(0.1)}));
+    viewer.send(&json!({"withdraw_forecast": {}}));
+    solver.step_until_told(&mut viewer, "order", has_status("given", "applied"));
+    solver.finish();
 }
 
 #[test]
@@ -310,7 +341,9 @@ fn the_end_of_a_run_does_not_wait_for_shapes() {
     let mut viewer = driven(&mut solver);
     viewer.send(&json!({"id": "long", "order": long(0.3)}));
     solver.step_until_told(&mut viewer, "order", has_status("long", "computing"));
+    let asked = Instant::now();
     let report = solver.finish();
+    assert!(asked.elapsed() < END, "the run went on for {:?}", asked.elapsed());
     let order = &report.orders[0];
     assert_eq!(order.status, OrderStatus::Rejected);
     assert!(order.reason.as_deref().unwrap().contains("given up"), "{order:?}");

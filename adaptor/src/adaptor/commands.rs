@@ -211,13 +211,16 @@ impl Adaptor {
             .map(|asked| (String::new(), Command::Order((*asked.order).clone())))
             .collect();
         for (index, (_, command)) in self.agreed_with_all(asked).into_iter().enumerate() {
+            let question = questions.get(index);
             let forecast = match (command, &self.mesh) {
                 (Command::Order(order), SteeredMesh::Steered(steerer, _)) => {
-                    Ok(steerer.forecast(&order))
+                    Ok(steerer.forecast(&order, question.map(|asked| asked.client)))
                 }
                 _ => Err(NO_MESH),
             };
-            if let (Some(Asked { client, id, .. }), Some(hub)) = (questions.get(index), &self.hub) {
+            if let (Some(Asked { client, id, .. }), Some(hub)) = (question, &self.hub)
+                && self.queue.is_wanted(*client)
+            {
                 tell_forecast(hub, *client, id.clone(), forecast);
             }
         }
@@ -400,6 +403,11 @@ impl Intake {
         }
     }
 
+    /// Lets go of what a viewer wanted to know.
+    fn withdraw_forecast(&self, client: u64) {
+        self.forecaster.get().into_iter().for_each(|forecaster| forecaster.withdraw(client));
+    }
+
     /// Has a viewer told what an order would come to.
     fn forecast(&self, client: u64, id: Option<String>, order: Order) -> Result<(), String> {
         let command = Command::Order(order);
@@ -473,6 +481,10 @@ impl CommandSink for Intake {
             Message::Question(Question::Forecast(order)) => {
                 return self.forecast(client, id, order);
             }
+            Message::Question(Question::WithdrawForecast {}) => {
+                self.withdraw_forecast(client);
+                return Ok(());
+            }
             Message::Command(command) => command,
             // The session has answered it.
             Message::Wheel(_) | Message::Together(_) => return Ok(()),
@@ -520,7 +532,7 @@ impl CommandSink for Intake {
     }
 
     fn left(&self, client: u64) {
-        self.forecaster.get().into_iter().for_each(|forecaster| forecaster.withdraw(client));
+        self.withdraw_forecast(client);
     }
 
     fn orders(&self) -> Value {

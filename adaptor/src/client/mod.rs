@@ -316,6 +316,15 @@ impl Client {
         self.say(&json!(Question::Forecast(order.clone())))
     }
 
+    /// Wants to know no more what it asked for last: the run gives that forecast up, and does not answer it
+    /// unless the answer is on its way.
+    ///
+    /// # Errors
+    /// As of [`Client::send`].
+    pub fn withdraw_forecast(&self) -> Result<String, ClientError> {
+        self.say(&json!(Question::WithdrawForecast {}))
+    }
+
     /// Holds the solver at its next safe point.
     ///
     /// # Errors

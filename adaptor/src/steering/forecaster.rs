@@ -49,10 +49,12 @@ impl Forecaster {
         }
     }
 
-    /// Gives up the forecasts of an asker who is gone.
+    /// Gives up the forecasts of an asker who is gone, or wants to know them no more. None is answered
+    /// afterwards.
     pub(crate) fn withdraw(&self, asker: u64) {
-        if let Planning::Beside(jobs) = &self.planning {
-            jobs.withdraw(asker);
+        match &self.planning {
+            Planning::Beside(jobs) => jobs.withdraw(asker),
+            Planning::Together(planned) => planned.withdraw(asker),
         }
     }
 

@@ -38,6 +38,14 @@ pub(crate) struct Asked {
     pub(crate) order: Box<Order>,
 }
 
+/// What viewers want to know.
+#[derive(Debug, Default)]
+struct Questions {
+    waiting: Vec<Asked>,
+    /// Those who asked what the ranks have taken up together, until it is answered.
+    taken_up: Vec<u64>,
+}
+
 /// The queue. To look whether anything happened costs the solver one atomic load.
 #[derive(Debug)]
 pub(crate) struct Queue {
@@ -48,7 +56,7 @@ pub(crate) struct Queue {
     room: Arc<Room>,
     /// The room for commands that a run must hear whatever else waits.
     urgent: Arc<Room>,
-    questions: Mutex<Vec<Asked>>,
+    questions: Mutex<Questions>,
     arrived: Condvar,
 }
 
@@ -100,17 +108,33 @@ impl Queue {
     /// Asks in place of what the same client asked before and was not told yet, which is returned.
     pub(crate) fn ask(&self, asked: Asked) -> Option<Asked> {
         let mut questions = lock(&self.questions);
-        let before = questions.iter().position(|waiting| waiting.client == asked.client);
-        let overtaken = before.map(|index| questions.remove(index));
-        questions.push(asked);
+        let waiting = &mut questions.waiting;
+        let before = waiting.iter().position(|before| before.client == asked.client);
+        let overtaken = before.map(|index| waiting.remove(index));
+        waiting.push(asked);
         drop(questions);
         self.call();
         overtaken
     }
 
-    /// All that is asked.
+    /// All that is asked: the ranks take it up.
     pub(crate) fn take_questions(&self) -> Vec<Asked> {
-        std::mem::take(&mut *lock(&self.questions))
+        let mut questions = lock(&self.questions);
+        let taken = std::mem::take(&mut questions.waiting);
+        questions.taken_up = taken.iter().map(|asked| asked.client).collect();
+        taken
+    }
+
+    /// Lets go of what a client wanted to know.
+    pub(super) fn withdraw(&self, client: u64) {
+        let mut questions = lock(&self.questions);
+        questions.waiting.retain(|asked| asked.client != client);
+        questions.taken_up.retain(|&asker| asker != client);
+    }
+
+    /// Whether a client still wants to know what the ranks have taken up.
+    pub(crate) fn is_wanted(&self, client: u64) -> bool {
+        lock(&self.questions).taken_up.contains(&client)
     }
 
     /// Tells the solver's thread that there is something to look at.

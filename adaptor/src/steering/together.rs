@@ -22,10 +22,18 @@ pub(crate) struct PlanTogether {
     queue: Arc<Queue>,
 }
 
+/// What the ranks may be told to give up.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum UnderWay {
+    /// The plan of the order of this id.
+    Order(String),
+    /// The forecast that this client asked for.
+    Forecast(u64),
+}
+
 #[derive(Default)]
 struct State {
-    /// The order whose plan is being made.
-    order: Option<String>,
+    under_way: Option<UnderWay>,
     /// Whatever is asked for is given up.
     gives_up: bool,
 }
@@ -35,9 +43,9 @@ impl PlanTogether {
         Self { state: Mutex::default(), cancellation, queue }
     }
 
-    /// Does work that all ranks do together. It is given up where the run is to end and, where it is
-    /// the plan of an `order`, where somebody takes that back. Collective.
-    pub(super) fn run<T>(&self, order: Option<&str>, work: impl FnOnce() -> T) -> T {
+    /// Does work that all ranks do together. It is given up where the run is to end, and where rank 0
+    /// says what it is and that is taken back. Collective.
+    pub(super) fn run<T>(&self, what: Option<UnderWay>, work: impl FnOnce() -> T) -> T {
         {
             let mut state = lock(&self.state);
             // On every rank: what was agreed on before is over. The wish of rank 0 stays.
@@ -45,25 +53,42 @@ impl PlanTogether {
             if state.gives_up {
                 self.cancellation.cancel();
             }
-            state.order = order.map(str::to_owned);
+            state.under_way.clone_from(&what);
         }
-        // A command is in the queue before [`PlanTogether::take_back`] hears of it: here it is found, or
-        // there.
-        let mut is_taken_back = false;
-        self.queue.look(|received| {
-            is_taken_back |= order.is_some() && taken_back(&received.command) == order;
-        });
-        if is_taken_back {
+        // The queue knows before [`PlanTogether::take_back`] and [`PlanTogether::withdraw`] come here:
+        // it is seen now, or there.
+        let is_given_up = match &what {
+            Some(UnderWay::Order(order)) => {
+                let mut is_taken_back = false;
+                self.queue.look(|received| {
+                    is_taken_back |= taken_back(&received.command) == Some(order);
+                });
+                is_taken_back
+            }
+            Some(UnderWay::Forecast(client)) => !self.queue.is_wanted(*client),
+            None => false,
+        };
+        if is_given_up {
             self.cancellation.cancel();
         }
         let done = work();
-        lock(&self.state).order = None;
+        lock(&self.state).under_way = None;
         done
     }
 
     /// Gives the plan of an order up that is taken back by a command in the queue.
     pub(super) fn take_back(&self, order: &str) {
-        if lock(&self.state).order.as_deref() == Some(order) {
+        self.give_up_one(&UnderWay::Order(order.to_owned()));
+    }
+
+    /// Gives up the forecast that a client asked for.
+    pub(super) fn withdraw(&self, client: u64) {
+        self.queue.withdraw(client);
+        self.give_up_one(&UnderWay::Forecast(client));
+    }
+
+    fn give_up_one(&self, what: &UnderWay) {
+        if lock(&self.state).under_way.as_ref() == Some(what) {
             self.cancellation.cancel();
         }
     }

@@ -13,7 +13,8 @@ use futures_util::{
 use serde_json::json;
 use tokio_tungstenite::tungstenite;
 use tombolo_pipelines::language::{
-    JournalNote, LinkFor, Message as Said, Together, ViewerMove, ViewerNote, Wheel, parse_message,
+    JournalNote, LinkFor, Message as Said, Question, Together, ViewerMove, ViewerNote, Wheel,
+    parse_message,
 };
 use tracing::info;
 
@@ -109,6 +110,8 @@ impl Drop for Seat<'_> {
     }
 }
 
+/// Writes what there is for a viewer, and has it sent once there is nothing more: frames of several
+/// views go out together.
 async fn write(
     mut sink: SplitSink<WebSocket, Wire>,
     client: &Client,
@@ -124,11 +127,11 @@ async fn write(
                 topologies.retain(|&view, _| hub.has_view(view));
                 // Of later ones the viewer hears one by one.
                 let orders = is_first.then(|| commands.orders());
-                sink.send(Wire::text(hub.hello(client.id, orders))).await
+                sink.feed(Wire::text(hub.hello(client.id, orders))).await
             }
-            Ok(Some(Message::Text(text))) => sink.send(Wire::Text(text.written())).await,
+            Ok(Some(Message::Text(text))) => sink.feed(Wire::Text(text.written())).await,
             Ok(Some(Message::Stack(change))) => {
-                sink.send(Wire::Text(change.text().written())).await
+                sink.feed(Wire::Text(change.text().written())).await
             }
             Ok(Some(Message::Frame(view, frame))) => {
                 // One that goes on from another follows a frame of the same topology.
@@ -136,7 +139,7 @@ async fn write(
                 let is_known = topologies.insert(view, topology) == Some(topology);
                 let message = if is_known { frame.message.clone() } else { frame.with_topology() };
                 let bytes = message.len();
-                let written = sink.send(Wire::Binary(message)).await;
+                let written = sink.feed(Wire::Binary(message)).await;
                 if written.is_ok() {
                     hub.sent(bytes, &frame);
                 }
@@ -153,12 +156,13 @@ async fn write(
                 hub.want_key(view, level);
                 Ok(())
             }
-            Ok(None) => {
-                tokio::select! {
+            Ok(None) => match sink.flush().await {
+                Ok(()) => tokio::select! {
                     () = client.wake.notified() => Ok(()),
-                    _ = ping.tick() => sink.send(Wire::Ping(Bytes::new())).await,
-                }
-            }
+                    _ = ping.tick() => sink.feed(Wire::Ping(Bytes::new())).await,
+                },
+                failed => failed,
+            },
             Err((code, reason)) => {
                 let _ =
                     sink.send(Wire::Close(Some(CloseFrame { code, reason: reason.into() }))).await;
@@ -226,7 +230,7 @@ fn is_too_long(error: axum::Error) -> bool {
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
-/// "forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
+/// "forecast" | "withdraw_forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
 /// "note" | "remove_note" | "views": ...}`.
 fn receive(
     text: &str,
@@ -260,6 +264,10 @@ fn receive(
         Ok(Said::Wheel(Wheel::Here {})) => Ok(()),
         Ok(Said::Wheel(Wheel::Drive {})) if client.access == Access::Drive => hub.drive(client.id),
         Ok(Said::Together(together)) => take(together, id.clone(), seat, credentials),
+        // Also of one that has lost the wheel since it asked.
+        Ok(message @ Said::Question(Question::WithdrawForecast {})) => {
+            commands.receive(client.id, id.clone(), message, text)
+        }
         message if !drives => {
             let asked = message.as_ref().map_or("what nobody understands", asked_for);
             seat.refuse(Refused::Command, |who| format!("{who} asked for {asked} in vain"));
@@ -277,7 +285,8 @@ fn receive(
 fn asked_for(message: &Said) -> &'static str {
     match message {
         Said::Command(command) => command.name(),
-        Said::Question(_) => "forecast",
+        Said::Question(Question::Forecast(_)) => "forecast",
+        Said::Question(Question::WithdrawForecast {}) => "withdraw_forecast",
         Said::Wheel(Wheel::HandOver { .. }) => "hand_over",
         Said::Wheel(Wheel::Kick { .. }) => "kick",
         Said::Wheel(Wheel::Drive {} | Wheel::Here {}) => "drive",

@@ -107,7 +107,7 @@ fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
         _ => "",
     };
     match key {
-        "forecast" => document.valid().map(Message::Question),
+        "forecast" | "withdraw_forecast" => document.valid().map(Message::Question),
         "drive" | "hand_over" | "kick" | "here" => document.value().map(Message::Wheel),
         "link" | "name" | "follow" | "camera" | "note" | "remove_note" | "views" => {
             document.valid().map(Message::Together)

@@ -149,8 +149,12 @@ impl Validate for Command {
 
 impl Validate for Question {
     fn validate(&self) -> Result<(), Problem> {
-        let Question::Forecast(order) = self;
-        order.validate().map_err(|problem| problem.within("forecast"))
+        match self {
+            Question::Forecast(order) => {
+                order.validate().map_err(|problem| problem.within("forecast"))
+            }
+            Question::WithdrawForecast {} => Ok(()),
+        }
     }
 }
 

@@ -181,7 +181,7 @@ export type ServerMessage =
   | { kind: "error"; body: ServerError };
 
 export type ClientMessage = { id?: string } & (
-  | { order: Json } | { forecast: Json } | { pause: object } | { resume: object } | { stop: object }
+  | { order: Json } | { forecast: Json } | { withdraw_forecast: object } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
   | { play: { seek?: { seconds: number }; speed?: number; paused?: boolean } }
   | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }

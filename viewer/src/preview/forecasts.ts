@@ -2,7 +2,7 @@
  * What the order that stands in the form would come to: the quality of the mesh that it would make, before Apply is pressed.
  *
  * The simulation finds it out beside its own work and changes nothing. One is asked for when the form has rested for a moment;
- * the server forgets those that were overtaken.
+ * the server forgets those that were overtaken, and is told where nobody wants to know any more.
  */
 import type { ForecastAnswer, Json } from "../connection/protocol";
 import type { Action } from "../store/actions";
@@ -17,14 +17,21 @@ const REST = 250;
 
 interface Wish { order: Json | null; stack: Json[]; steering: boolean }
 
+/** The way to the simulation. */
+export interface Questions {
+  /** Asks for the forecast of an order; under what name, or null where nobody can be asked. */
+  ask(order: Json): string | null;
+  /** Says that nobody wants to know any more. */
+  withdraw(): void;
+}
+
 export class Forecasts {
   private asked: string | null = null;
   /** The names of questions that were overtaken and are not answered yet. */
   private readonly overtaken = new Set<string>();
   private resting: ReturnType<typeof setTimeout> | undefined;
 
-  /** `send` asks for the forecast of an order and says under what name it was asked, or null where nobody can be asked. */
-  constructor(private readonly store: Store<State, Action>, private readonly send: (order: Json) => string | null) {
+  constructor(private readonly store: Store<State, Action>, private readonly questions: Questions) {
     store.watch(
       (state): Wish => ({ order: wishedOrder(state), stack: state.hello?.stack ?? [], steering: isSteering(state) }),
       (wish) => this.changed(wish),
@@ -35,14 +42,23 @@ export class Forecasts {
   /** Another order is composed, or it would start from another shape. */
   private changed({ order, steering }: Wish): void {
     clearTimeout(this.resting);
-    if (this.asked !== null) this.overtaken.add(this.asked);
+    const before = this.asked;
+    if (before !== null) this.overtaken.add(before);
     this.asked = null;
-    if (order === null || !steering) return this.store.dispatch({ type: "forecast cleared" });
+    if (order === null || !steering) {
+      if (before !== null && !this.isGiven()) this.questions.withdraw();
+      return this.store.dispatch({ type: "forecast cleared" });
+    }
     this.store.dispatch({ type: "forecast asked" });
     this.resting = setTimeout(() => {
-      this.asked = this.send(order);
+      this.asked = this.questions.ask(order);
       if (this.asked === null) this.store.dispatch({ type: "forecast cleared" });
     }, REST);
+  }
+
+  /** Whether the order was given just now: it takes the shapes that its forecast finds. */
+  private isGiven(): boolean {
+    return this.store.state.orders.some(({ status }) => status === "sent");
   }
 
   answer(answer: ForecastAnswer): void {

@@ -9,6 +9,7 @@ const TOLD: ForecastAnswer["order"] = {
 
 describe("a forecast", () => {
   let sent: { edits: Json[] }[];
+  let withdrawn: number;
   let made: ReturnType<typeof page>;
   let forecasts: Forecasts;
   const ask = (x: number): void => made.store.dispatch({ type: "composed", key: "translate", values: { by: [x, 0, 0] }, step: "typed" });
@@ -20,7 +21,11 @@ describe("a forecast", () => {
     sent = [];
     made = page();
     made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
-    forecasts = new Forecasts(made.store, (order) => `f${sent.push(order as { edits: Json[] })}`);
+    withdrawn = 0;
+    forecasts = new Forecasts(made.store, {
+      ask: (order) => `f${sent.push(order as { edits: Json[] })}`,
+      withdraw: () => { withdrawn += 1; },
+    });
   });
   afterEach(() => { vi.useRealTimers(); });
 
@@ -46,6 +51,27 @@ describe("a forecast", () => {
     vi.advanceTimersByTime(1000);
     expect(sent).toHaveLength(1);
     expect(state()).toBe("none");
+  });
+
+  it("is given up where nobody wants to know any more, and not where its order was given", () => {
+    ask(1);
+    made.store.dispatch({ type: "cleared" });
+    vi.advanceTimersByTime(1000);
+    expect([sent.length, withdrawn]).toEqual([0, 0]);
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    ask(2);
+    expect(withdrawn).toBe(0);
+    vi.advanceTimersByTime(1000);
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(1);
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(1);
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    made.store.dispatch({ type: "order sent", id: "o", order: sent.at(-1)!, at: 0 });
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(1);
   });
 
   it("that was overtaken before it was begun is an error of which nothing is said", () => {

@@ -28,7 +28,7 @@ use super::{
     lent::{Own, Rounding},
     planner::{PlanRequest, Planner, Rejection},
     stack::StackError,
-    together::PlanTogether,
+    together::{PlanTogether, UnderWay},
     worker::Worker,
 };
 use crate::lock::lock;
@@ -272,13 +272,13 @@ impl Steerer {
         Some(Forecaster { present: Arc::clone(&self.present), planning })
     }
 
-    /// The forecast of an order, made at once. Collective.
-    pub(crate) fn forecast(&self, order: &Order) -> Forecast {
+    /// The forecast of an order, made at once; on rank 0 `asker` says who wants to know. Collective.
+    pub(crate) fn forecast(&self, order: &Order, asker: Option<u64>) -> Forecast {
         match self.asked(order) {
             Ok((_, asked)) => {
                 let forecast = || lock(&self.planner).forecast(&asked);
                 match &self.together {
-                    Some(together) => together.run(None, forecast),
+                    Some(together) => together.run(asker.map(UnderWay::Forecast), forecast),
                     None => forecast(),
                 }
             }

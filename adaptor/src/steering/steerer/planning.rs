@@ -10,6 +10,7 @@ use crate::{
     steering::{
         OrderStatus,
         planner::Rejection,
+        together::UnderWay,
         worker::{Done, Worker},
     },
     step::Moment,
@@ -103,9 +104,9 @@ impl Steerer {
                         // A replay repeats what was done, which cannot be cancelled any more.
                         let recorded = self.recorded.as_ref();
                         let is_repeated = recorded.is_some_and(|it| it.repeats(moment.cycle));
-                        let id = (!is_repeated).then_some(&*computing.id);
+                        let order = (!is_repeated).then(|| UnderWay::Order(computing.id.clone()));
                         let plan = || lock(&self.planner).plan(&computing.asked);
-                        let plan = together.run(id, plan);
+                        let plan = together.run(order, plan);
                         if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
                             return Some(computing.into_task());
                         }

@@ -1,0 +1,123 @@
+//! Shapes that several ranks find together, inside of a step: what a viewer says meanwhile has them
+//! given up on all ranks at the same place. The ranks are threads here.
+
+mod common;
+
+use std::{sync::Arc, time::Duration};
+
+use common::{LINK_TO_ALL, Viewer, config, squeeze};
+use serde_json::{Value, json};
+use tombolo::{
+    Adaptor, Settings, Step,
+    communicator::{Communicator, threads},
+    deform::{distributed::Part, shapes::box_of_tets},
+    pipelines::extract::Channel,
+};
+
+const RANKS: usize = 3;
+
+/// An order whose shapes take long to find.
+fn long() -> Value {
+    let mut order = squeeze(0.3);
+    order["schedule"] = json!({"steps": 10_000});
+    order
+}
+
+/// What a rank has done: its last cycle, the orders that moved its mesh, and on the first what the
+/// viewer found.
+type Outcome<T> = (u64, Vec<String>, Option<T>);
+
+/// Steps on all ranks until the viewer stops them, which says something from a thread of its own.
+fn run<T: Send>(say: impl Fn(&mut Viewer) -> T + Send + Sync) -> Vec<Outcome<T>> {
+    let mesh = box_of_tets([24, 24, 24], [0.0; 3], [1.0; 3]);
+    let cells = mesh.cells().len();
+    let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+    let say = &say;
+    threads::run(RANKS, |ranks| {
+        let rank = ranks.rank();
+        let part = Part::cut(&mesh, &of_cells, rank, true).expect("a part");
+        let settings = Settings {
+            config: config(LINK_TO_ALL),
+            communicator: Arc::new(ranks),
+            ..Settings::default()
+        };
+        let mut adaptor = Adaptor::initialize(settings).expect("initialize");
+        std::thread::scope(|scope| {
+            let (mut saying, mut moved, mut cycle) = (None, Vec::new(), 0);
+            loop {
+                let step = Step { cycle, time: cycle as f64 * 0.01, time_step: 0.01 };
+                let channels = [Channel::new("fluid", part.view(), &[])];
+                let steering = adaptor.execute(&step, &channels).expect("execute");
+                moved.extend(steering.motion.map(|motion| motion.order.to_owned()));
+                if steering.stop {
+                    break;
+                }
+                if rank == 0 && cycle == 0 {
+                    let mut viewer = Viewer::connect(&adaptor);
+                    viewer.hello();
+                    saying = Some(scope.spawn(move || {
+                        let found = say(&mut viewer);
+                        viewer.send(&json!({"id": "end", "stop": {}}));
+                        found
+                    }));
+                }
+                std::thread::sleep(Duration::from_millis(2));
+                cycle += 1;
+                assert!(cycle < 100_000, "nobody stopped the run");
+            }
+            adaptor.finalize().expect("finalize");
+            let found = saying.map(|thread| thread.join().expect("the viewer"));
+            (cycle, moved, found)
+        })
+    })
+}
+
+/// Whatever was given up, the ranks have done the same.
+fn assert_same<T>(outcomes: &[Outcome<T>]) {
+    for (cycle, moved, _) in outcomes {
+        assert_eq!((cycle, moved), (&outcomes[0].0, &outcomes[0].1));
+    }
+}
+
+/// The next order is carried out.
+#[test]
+fn an_order_is_cancelled_while_all_ranks_find_its_shapes() {
+    let outcomes = run(|viewer| {
+        let is = |id: &'static str, status: &'static str| {
+            move |order: &Value| order["id"] == id && order["status"] == status
+        };
+        viewer.send(&json!({"id": "long", "order": long()}));
+        viewer.wait_for("order", is("long", "computing"));
+        viewer.send(&json!({"id": "c", "cancel": {"order": "long"}}));
+        let told = viewer.wait_for("order", is("long", "rejected"));
+        viewer.send(&json!({"id": "short", "order": squeeze(0.1)}));
+        viewer.wait_for("order", is("short", "applied"));
+        told["reason"].as_str().map(str::to_owned)
+    });
+    assert_eq!(outcomes[0].2, Some(Some("cancelled by c1".into())));
+    assert_same(&outcomes);
+    let moved = &outcomes[0].1;
+    assert!(!moved.is_empty() && moved.iter().all(|order| order == "short"), "{moved:?}");
+}
+
+/// It is given up, before it has begun or in its midst, and is not answered; the next one is.
+#[test]
+fn a_forecast_is_withdrawn_while_all_ranks_find_it() {
+    let outcomes = run(|viewer| {
+        let mut answered = Vec::new();
+        for pause in [0, 300, 1000] {
+            viewer.send(&json!({"id": "long", "forecast": long()}));
+            std::thread::sleep(Duration::from_millis(pause));
+            viewer.send(&json!({"withdraw_forecast": {}}));
+            viewer.send(&json!({"id": "short", "forecast": squeeze(0.1)}));
+            let told = viewer.wait_for("forecast", |told| !told.is_null());
+            let refused = viewer.look_for("error", Duration::from_millis(1), |_| true);
+            answered.push((told["id"].clone(), told["order"]["outcome"].clone(), refused));
+        }
+        answered
+    });
+    let short = (json!("short"), json!("applied"), None);
+    assert_eq!(outcomes[0].2, Some(vec![short; 3]));
+    assert_same(&outcomes);
+    assert!(outcomes[0].1.is_empty());
+}
