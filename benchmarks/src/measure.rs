@@ -33,6 +33,11 @@ impl Times {
         self.percentile(0.5)
     }
 
+    /// The mean of the runs; NaN of none.
+    pub fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
     /// What this part of the runs, from 0 to 1, do not exceed; NaN of none.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
     pub fn percentile(&self, part: f64) -> f64 {
