@@ -94,8 +94,9 @@ const steps = [
     check(/^before “Throat: height × 0\.7”/.test(await viewer.text("#before .caption")), "the other picture does not say what it came before");
     await viewer.picture("compared", "compared.png");
     await clean("side by side");
-    const [left, right] = await page.evaluate(() => ["before", "stage"].map((id) => document.getElementById(id).getBoundingClientRect().width));
-    check(Math.abs(left - right) < 4, `the pictures are ${left} and ${right} wide`);
+    const [left, right, bars] = await page.evaluate(() => [".before-scene", "#scene", "#bars"].map((selector) => document.querySelector(selector).getBoundingClientRect().toJSON()));
+    check(Math.abs(left.width - right.width) < 4, `the pictures are ${left.width} and ${right.width} wide`);
+    check(bars.left >= right.right, `the bars begin at ${bars.left}, the picture of now ends at ${right.right}`);
   }],
   ["both pictures are seen from the same place", async () => {
     // The one of before is dragged, and the one of now turns with it.

@@ -44,7 +44,7 @@ import { WheelPanel } from "./panels/wheel";
 import { makeCanvas } from "./picture/canvas";
 import type { Canvas } from "./picture/canvas";
 import { ScalarBars, fieldText, withUnit } from "./picture/bars";
-import { Triad, coveredBy, showEmpty } from "./picture/overlay";
+import { Triad, coveredBy, leaveRoomFor, showEmpty } from "./picture/overlay";
 import { Marks } from "./picture/marks";
 import { Pins } from "./picture/pins";
 import { watchPointer } from "./picture/pointer";
@@ -168,11 +168,14 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
     if (store.state.frames.count > 0) later.begin();
   },
   trouble: report,
-  covered: () => coveredBy(part("stage"), part("tools"), part("bars")),
+  covered: () => coveredBy(part("scene"), part("tools"), part("bars")),
   lost: (gone) => { isLost = gone; sayEmpty(); },
 });
 // The bars of a view may come after the first picture, and go.
-new ResizeObserver(() => scene.camera.refit()).observe(part("bars"));
+new ResizeObserver(() => {
+  leaveRoomFor(part("bars"), part("pictures"));
+  scene.camera.refit();
+}).observe(part("bars"));
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
 const line = new Ruler(marks, "line", (from, to) => {
@@ -321,7 +324,10 @@ const previewer = new Previewer(scene, addresses.surface, kernel, store);
 // Once the page has come to rest: nobody drags a shape in the first moment.
 later.run(() => window.setTimeout(() => previewer.prepare(), 500));
 new FilesPanel(store, commands, { surface: () => previewer.surfaceNow(), content: contentOf });
-const forecasts = new Forecasts(store, (order) => commands.ask({ forecast: order }));
+const forecasts = new Forecasts(store, {
+  ask: (order) => commands.ask({ forecast: order }),
+  withdraw: () => void commands.ask({ withdraw_forecast: {} }),
+});
 new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
 watchKeys(store, commands);
 new Tour(() => {

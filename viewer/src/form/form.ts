@@ -1,6 +1,6 @@
 /** The form for an order: made from the schema that the simulation sends, never from knowledge of its own. */
 import type { FeatureInformation, Json } from "../connection/protocol";
-import { element, write } from "../dom";
+import { element } from "../dom";
 import { digits } from "../number";
 import type { Action } from "../store/actions";
 import { bodyOf, isObject } from "../store/draft";
@@ -9,6 +9,7 @@ import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { keepingControl, objectControl } from "./controls";
 import type { Control, Special } from "./controls";
+import { ScheduleSummary } from "./schedule";
 import { ROLES } from "./schema";
 import type { OrderForm, Property, Values } from "./schema";
 
@@ -88,7 +89,7 @@ export class EditForm {
     this.showDraft();
   }
 
-  /** The schedule as one sentence, which unfolds; what else an order can set is sent only where it is set. */
+  /** The schedule as one sentence and a curve, which unfolds; what else an order can set is sent only where it is set. */
   private settingsPart(form: OrderForm): HTMLElement {
     const isSchedule = (property: Property): boolean => property.name === "schedule";
     const unwrapped = form.settings.map((property) => ({
@@ -102,22 +103,22 @@ export class EditForm {
     // The values of the simulation stand ready behind the boxes that are not ticked.
     rest.write({ ...this.store.state.hello?.defaults });
     rest.write({});
-    const sentence = element("summary", {});
+    const summary = new ScheduleSummary();
     this.settings = {
       root: element("div"),
       read: (problems) => {
         const values: Values = { ...(schedule.read(problems) as Values), ...(rest.read(problems) as Values) };
-        write(sentence, scheduleSentence(values.schedule));
+        summary.show(values.schedule);
         return values;
       },
       write: (value) => {
         schedule.write(value);
         rest.write(value);
-        write(sentence, scheduleSentence(isObject(value) ? value.schedule : undefined));
+        summary.show(isObject(value) ? value.schedule : undefined);
       },
     };
     return element("div", { class: "settings" },
-      form.settings.some(isSchedule) ? element("details", { class: "schedule" }, sentence, schedule.root) : null,
+      form.settings.some(isSchedule) ? element("details", { class: "schedule" }, summary.root, schedule.root) : null,
       others.length > 0 ? element("details", {}, element("summary", {}, `More: ${others.map((property) => property.label).join(", ")}`), rest.root) : null);
   }
 
@@ -166,18 +167,4 @@ export class EditForm {
 /** The settings that an order begins with: of the server's own only the schedule is always sent. */
 export function initialSettings(defaults: { schedule?: Json }): Values {
   return defaults.schedule === undefined || defaults.schedule === null ? {} : { schedule: defaults.schedule };
-}
-
-/** A schedule in one sentence, such as "10 shapes over 20 steps". */
-export function scheduleSentence(schedule: Json | undefined): string {
-  if (!isObject(schedule)) return "Schedule";
-  const { steps, every } = schedule;
-  if (typeof steps !== "number") return "Schedule";
-  const shapes = steps === 1 ? "1 shape" : `${steps} shapes`;
-  if (isObject(every) && typeof every.steps === "number") {
-    const all = steps * every.steps;
-    return steps === 1 ? "In 1 shape, at once" : `${shapes} over ${all} ${all === 1 ? "step" : "steps"}`;
-  }
-  if (isObject(every) && typeof every.time === "number") return `${shapes} over ${digits(steps * every.time, 3)} of simulated time`;
-  return shapes;
 }

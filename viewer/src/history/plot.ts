@@ -4,6 +4,7 @@ import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
 import { placeNames, shortened } from "./mark-names";
+import { monitorHint, monitorText } from "./monitor-names";
 import { SERIES_COLOURS, axesOf, calm, labelled, roomy, seriesColour, seriesStyle } from "./plotting";
 import type { Tab } from "./dock";
 import type { Comparison, History, Mark, Series } from "./series";
@@ -151,7 +152,7 @@ export class HistoryPlot implements Tab {
       });
       box.checked = position >= 0;
       if (position >= 0) box.style.accentColor = seriesStyle(position);
-      return element("label", { title: PIN.test(one.source) ? one.source : `pipeline ${one.source}` }, box, label(one));
+      return element("label", { title: hintOf(one) }, box, label(one));
     }));
     if (focused) this.choices.querySelector<HTMLElement>(`[data-series="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -263,7 +264,7 @@ export class HistoryPlot implements Tab {
       const found = compare(this.history, key, cycle, this.marks);
       order = found.order ?? order;
       const { shown, hint } = differenceText(found);
-      return { name: one ? label(one) : "", colour: seriesStyle(i), cells: [digits(found.value), digits(found.before), shown], hint };
+      return { name: one ? label(one) : "", title: one ? hintOf(one) : "", colour: seriesStyle(i), cells: [digits(found.value), digits(found.before), shown], hint };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
     write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
@@ -288,10 +289,15 @@ export class HistoryPlot implements Tab {
 /** Series of one unit share an axis, and of those without a unit the ones of one name: the same field at two pins. */
 const scaleOf = ({ unit, name }: Series): string => (unit ? `unit ${unit}` : `name ${name}`);
 
-/** A series in words: its name and unit, before which stands at which pin it is read. */
+/** A series in words: what it is of and its unit, before which stands at which pin it is read. */
 function label({ source, name, unit }: Series): string {
   const [, pin] = PIN.exec(source) ?? [];
-  return `${pin === undefined ? "" : `${pin}: `}${name}${unit ? ` [${unit}]` : ""}`;
+  return `${pin === undefined ? monitorText(name) : `${pin}: ${name}`}${unit ? ` [${unit}]` : ""}`;
+}
+
+/** A series in words, with the name by which conditions and files call it where it is a monitor. */
+function hintOf(series: Series): string {
+  return PIN.test(series.source) ? label(series) : `${label(series)}: ${monitorHint(series.source, series.name)}`;
 }
 
 /** A difference beyond which a part in the hundred says less than the difference itself. */

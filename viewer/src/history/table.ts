@@ -3,6 +3,8 @@ import { element, identifier, write } from "../dom";
 
 export interface Row {
   name: string;
+  /** What stands under the pointer at the name; left out, the name. */
+  title?: string;
   /** The colour of what is drawn for it. */
   colour: string;
   /** A text for each heading. */
@@ -31,12 +33,12 @@ export class ValueTable {
     // Headings alone say nothing.
     this.element.tHead!.hidden = rows.length === 0;
     for (const { row } of this.rows.splice(rows.length)) row.remove();
-    for (const [index, { name, colour, cells, hint = "" }] of rows.entries()) {
+    for (const [index, { name, title = name, colour, cells, hint = "" }] of rows.entries()) {
       const parts = this.rows[index] ?? this.append();
       parts.sign.style.background = colour;
       write(parts.name, name);
       // It is cut off where the numbers leave it too little room.
-      parts.head.title = name;
+      parts.head.title = title;
       parts.cells.forEach((cell, i) => write(cell, cells[i] ?? ""));
       const last = parts.cells.at(-1);
       if (last) last.title = hint;

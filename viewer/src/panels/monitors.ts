@@ -1,6 +1,7 @@
 /** The newest values of the monitors. */
 import type { Monitor, MonitorInformation } from "../connection/protocol";
 import { element, part, write } from "../dom";
+import { monitorHint, monitorText } from "../history/monitor-names";
 import { seriesKey } from "../history/series";
 import { digits } from "../number";
 
@@ -24,7 +25,7 @@ export class MonitorPanel {
       if (!known) {
         if (this.rows.size >= ROWS) continue;
         const shown = element("output", {});
-        known = { shown, value, row: element("div", { class: "monitor", title: `pipeline ${monitor.pipeline}` }, element("span", {}, name), shown) };
+        known = { shown, value, row: element("div", { class: "monitor", title: monitorHint(monitor.pipeline, name) }, element("span", {}, monitorText(name)), shown) };
         this.rows.set(key, known);
         this.root.append(known.row);
       }

@@ -51,9 +51,17 @@ export function showEmpty(title: string, text: string): void {
   write(part("empty-text"), text);
 }
 
+/** The pixels that part the bars from the edge of the page and from the picture beside them. */
+const AROUND_BARS = 24;
+
+/** Tells the page's style how wide the bars are: where two pictures stand side by side, they leave that free. */
+export function leaveRoomFor(bars: HTMLElement, pictures: HTMLElement): void {
+  pictures.style.setProperty("--bars-width", `${bars.offsetWidth > 0 ? bars.offsetWidth + AROUND_BARS : 0}px`);
+}
+
 /** The most of the picture that is left free for what lies over it, across and down. */
 const MOST = 0.4;
-/** A picture that is narrower, such as one of two, has nothing to spare beside it. */
+/** A picture that is narrower has nothing to spare beside it. */
 const NARROW = 480;
 
 /** How much of the picture the tools at its top and the bars at its right lie over. */

@@ -1,4 +1,5 @@
 /** Picking with the pointer: hovering names a feature, a click makes it a handle, a click with shift holds it fixed. */
+import { part, write } from "../dom";
 import { showTip } from "./overlay";
 import type { Scene } from "./scene";
 import type { Selection } from "../store/selection";
@@ -15,6 +16,8 @@ export interface PointerListener {
 }
 
 export function watchPointer(stage: HTMLElement, scene: Scene, selection: Selection, listener: PointerListener): void {
+  /** Readers of the screen are told what is a message; what the pointer passes over would never let them rest. */
+  const announcer = part("announcer");
   let down: { x: number; y: number } | null = null;
   let dragging = false;
   let last: PointerEvent | null = null;
@@ -51,7 +54,11 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
   stage.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     down = { x: event.clientX, y: event.clientY };
-    if (missed) showTip(null, 0, 0);
+    if (missed) {
+      showTip(null, 0, 0);
+      // The next miss is another one, which is told again.
+      if (announcer.textContent === MISSED) write(announcer, "");
+    }
     missed = false;
   });
   window.addEventListener("pointerup", (event) => {
@@ -62,6 +69,7 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
     const tool = listener.tool();
     if (tool) {
       missed = !tool(event.clientX, event.clientY);
+      if (missed) write(announcer, MISSED);
       last = event;
       // A miss at once: a finger that is lifted is not there any more.
       return missed ? hover() : schedule();

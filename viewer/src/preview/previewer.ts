@@ -91,7 +91,7 @@ export class Previewer {
       else this.say(NO_PREVIEW);
       return;
     }
-    this.say({ ...this.store.state.preview, state: "waiting", faults: null });
+    this.say({ ...this.store.state.preview, state: "waiting", faults: null, brokenIn: [] });
     this.started().show(this.stack, wished);
   }
 
@@ -144,8 +144,8 @@ export class Previewer {
       // A wish that came while the picture was drawn is answered by a later one.
       if (!newest || wished !== this.wished) return;
       const byName = Object.fromEntries(this.features.map((name, i) => [name, moved[i] ?? 0]));
-      const { faults } = this.store.state.preview;
-      this.say({ ...NO_PREVIEW, faults, state: "shown", largest, moved: byName, size, computing, milliseconds: performance.now() - asked });
+      const { faults, brokenIn } = this.store.state.preview;
+      this.say({ ...NO_PREVIEW, faults, brokenIn, state: "shown", largest, moved: byName, size, computing, milliseconds: performance.now() - asked });
     });
   }
 
@@ -157,9 +157,16 @@ export class Previewer {
 
   /** Colours what is wrong with the shape, also while the hand goes on; the verdict waits for the shape at which it rests. */
   private judge(faults: ShapeFaults | null, isNewest: boolean): void {
-    if (isNewest) this.say({ ...this.store.state.preview, faults: faults?.text ?? "" });
+    if (isNewest) this.say({ ...this.store.state.preview, faults: faults?.text ?? "", brokenIn: faults ? this.featuresWith(faults.triangles) : [] });
     if (faults || this.faulty) this.scene.setPreview(this.points, faults?.triangles);
     this.faulty = faults?.triangles;
+  }
+
+  /** The features that triangles lie in; none where one of them is of no feature. */
+  private featuresWith(triangles: Uint32Array): string[] {
+    const numbers = new Set([...triangles].map((triangle) => this.shown?.triangleFeatures[triangle]));
+    const names = [...numbers].map((number) => (number === undefined ? undefined : this.features[number]));
+    return names.every((name) => name !== undefined) ? names : [];
   }
 
   /** Nothing that was asked for comes. */

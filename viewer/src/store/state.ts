@@ -56,6 +56,8 @@ export interface PreviewState {
   reason: string | null;
   /** What is wrong with the shape; empty where it is sound, null as long as it was not looked at. */
   faults: string | null;
+  /** The features that have the faces where that is seen; empty also where one of these faces is of no feature. */
+  brokenIn: readonly string[];
 }
 
 export interface ForecastState {
@@ -112,7 +114,7 @@ export interface State {
   errors: readonly string[];
 }
 
-export const NO_PREVIEW: PreviewState = { state: "none", largest: null, moved: {}, size: null, milliseconds: null, computing: null, reason: null, faults: null };
+export const NO_PREVIEW: PreviewState = { state: "none", largest: null, moved: {}, size: null, milliseconds: null, computing: null, reason: null, faults: null, brokenIn: [] };
 export const NO_FORECAST: ForecastState = { state: "none", answer: null, reason: null };
 
 export const INITIAL: State = {

@@ -1,7 +1,8 @@
 /** The one verdict on what stands in the form, of the preview and the forecast: pure functions of the state. */
 import type { Vector } from "../connection/protocol";
+import type { Values } from "../form/schema";
 import { digits, seconds } from "../number";
-import { asksNothing, missing, openBoundariesMoved } from "./draft";
+import { asksNothing, bodyOf, chosen, isObject, missing, openBoundariesMoved } from "./draft";
 import { whyNotEditable } from "./edits";
 import { whyNotSteering } from "./run";
 import type { State } from "./state";
@@ -76,13 +77,27 @@ export function applyButton(state: State): { label: string; why: string; isAnywa
   return { label, why, isAnyway };
 }
 
-/** The way out of a refusal: the part that would pass, whether mending can be asked for, and where the worst cell is. */
+/** The way out of a refusal: the part that would pass, whether mending can be asked for and may help, and where the worst cell is. */
 export interface Remedies { fraction: number | null; untangle: boolean; worst: Vector | null }
 
-export function remedies({ forecast: { answer }, draft }: Pick<State, "forecast" | "draft">): Remedies | null {
+export function remedies(state: State): Remedies | null {
+  const { answer } = state.forecast;
   if (answer?.outcome !== "rejected") return null;
   const fraction = typeof answer.fraction === "number" && answer.fraction > 0.001 ? answer.fraction : null;
-  const guard = draft.remedy.guard ?? draft.settings.guard;
-  const mends = typeof guard === "object" && guard !== null && !Array.isArray(guard) && guard.otherwise === "untangle";
-  return { fraction, untangle: !mends, worst: answer.place ?? null };
+  return { fraction, untangle: mayUntangle(state), worst: answer.place ?? null };
+}
+
+/** Whether what is refused could pass if the guard untangled it: cells, and a surface that breaks where the edit leaves it free. */
+function mayUntangle({ forecast: { answer }, preview, draft, hello, selection }: State): boolean {
+  const setting = (name: "guard" | "deform"): Values => [draft.remedy[name], draft.settings[name], hello?.defaults[name]].find(isObject) ?? {};
+  // Asked for already; or no volume is solved for, and none is mended.
+  if (setting("guard").otherwise === "untangle" || setting("deform").method === "surface") return false;
+  if (typeof answer?.min_scaled_jacobian === "number") return true;
+  // Neither cells nor the surface: the edit asks for what cannot be done at all.
+  if (typeof answer?.fraction !== "number") return false;
+  // Sub-steps lead the free surface another way, and what the edit moves or holds to the same end.
+  const placed = (["handle", "fixed"] as const).flatMap((part) => chosen({ hello, selection }, part));
+  const { brokenIn } = preview;
+  const isOfWholeFeatures = (bodyOf(draft).region ?? null) === null;
+  return !isOfWholeFeatures || brokenIn.length === 0 || brokenIn.some((name) => !placed.includes(name));
 }

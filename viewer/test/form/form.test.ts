@@ -1,7 +1,7 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
-import { EditForm, scheduleSentence } from "../../src/form/form";
+import { EditForm } from "../../src/form/form";
 import { orderForm } from "../../src/form/schema";
 import { missing, wishedOrder } from "../../src/store/draft";
 import { Selection } from "../../src/store/selection";
@@ -165,12 +165,9 @@ describe("the form", () => {
     expect(label("smoothness").closest("details")!.querySelector("summary")!.textContent).toBe("Advanced");
   });
 
-  it("says the schedule in one sentence", () => {
+  it("says the schedule in one sentence, with a curve beside it", () => {
     expect(root.querySelector(".schedule summary")!.textContent).toBe("10 shapes over 50 steps");
-    expect(scheduleSentence({ steps: 10, every: { steps: 2 } })).toBe("10 shapes over 20 steps");
-    expect(scheduleSentence({ steps: 1, every: { steps: 1 } })).toBe("In 1 shape, at once");
-    expect(scheduleSentence({ steps: 4, every: { time: 0.5 } })).toBe("4 shapes over 2 of simulated time");
-    expect(scheduleSentence(null)).toBe("Schedule");
+    expect(root.querySelector(".schedule summary svg")!.getAttribute("aria-label")).toBe("The shape goes evenly");
   });
 
   it("waits for the schema", () => {

@@ -127,7 +127,8 @@ describe("the plots below the picture", () => {
     const plot = new HistoryPlot(history, null, () => undefined);
     for (const key of keys) plot.choose(key);
     plot.show(true);
-    expect(texts(plot, "tbody th")).toEqual(["quality.min", "probe 1: velocity magnitude", "probe 2: velocity magnitude"]);
+    expect(texts(plot, "tbody th")).toEqual(["Quality, minimum", "probe 1: velocity magnitude", "probe 2: velocity magnitude"]);
+    expect(plot.body.querySelector<HTMLElement>("tbody th")!.title).toBe("Quality, minimum: quality.min, of the pipeline health");
     expect(texts(plot, ".choices label").slice(0, 2)).toEqual(["probe 1: velocity magnitude", "probe 2: velocity magnitude"]);
     const [, ...scales] = made[0]!.options.series.map(({ scale }) => scale);
     expect([scales[1] === scales[2], scales[0] === scales[1], made[0]!.options.axes!.length]).toEqual([true, false, 3]);

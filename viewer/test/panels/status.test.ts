@@ -1,19 +1,16 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import { StatusBar } from "../../src/panels/status";
-import { WheelPanel } from "../../src/panels/wheel";
 import { STATUS, page } from "../page";
 import { openDocument } from "./document";
 
 describe("the bar", () => {
   let made: ReturnType<typeof page>;
-  let wheel: WheelPanel;
   const at = (id: string): HTMLButtonElement => document.getElementById(id) as HTMLButtonElement;
   beforeEach(() => {
     openDocument();
     made = page();
     new StatusBar(made.store, made.commands);
-    wheel = new WheelPanel(made.store, made.commands);
   });
 
   it("says that a run has ended, and how, and offers nothing more", () => {
@@ -55,55 +52,9 @@ describe("the bar", () => {
     }
   });
 
-  it("hands the wheel over, or keeps it, once another asks", () => {
-    expect(at("asked").hidden).toBe(true);
-    made.store.dispatch({ type: "wheel asked", by: "c4" });
-    expect([at("asked").hidden, at("asked-text").textContent]).toEqual([false, "Viewer c4 asks to steer."]);
-    at("hand-over").click();
-    expect(made.sent.at(-1)).toMatchObject({ hand_over: { to: "c4" } });
-    expect(at("asked").hidden).toBe(true);
-    made.store.dispatch({ type: "wheel asked", by: "c5" });
-    at("keep").click();
-    expect(made.sent.at(-1)).toMatchObject({ here: {} });
-  });
-
-  it("lets a watcher ask, where its link allows it", () => {
-    expect(at("wheel").hidden).toBe(true);
+  it("says who steers", () => {
     made.greet({ role: "watcher" });
     made.store.dispatch({ type: "status", status: { ...STATUS, driver: "c9" }, at: 0 });
     expect(at("role").textContent).toBe("watching · viewer c9 steers");
-    at("wheel").click();
-    expect(made.sent.at(-1)).toMatchObject({ drive: {} });
-    made.greet({ role: "watcher", may_drive: false });
-    expect(at("wheel").hidden).toBe(true);
-  });
-
-  it("says quietly that an answer is waited for, for a minute or until somebody else steers", () => {
-    vi.useFakeTimers();
-    try {
-      const now = (driver: string): void => made.store.dispatch({ type: "status", status: { ...STATUS, driver }, at: 0 });
-      const ask = (): boolean => {
-        at("wheel").click();
-        return wheel.told(String(made.sent.at(-1)!.id), "c9 has the wheel and is told that you ask for it");
-      };
-      const waiting = (): string | null => (at("waiting").hidden ? null : at("waiting").textContent);
-      made.greet({ role: "watcher" });
-      now("c9");
-      expect([wheel.told("another", "no"), waiting()]).toEqual([false, null]);
-      expect([ask(), waiting(), made.store.state.refusal]).toEqual([true, "c9 has the wheel and is told that you ask for it.", ""]);
-      vi.advanceTimersByTime(59_000);
-      now("c9");
-      expect(waiting()).not.toBeNull();
-      vi.advanceTimersByTime(2000);
-      expect(waiting()).toBeNull();
-      ask();
-      now("c4");
-      expect(waiting()).toBeNull();
-      ask();
-      made.greet({ role: "driver" });
-      expect(waiting()).toBeNull();
-    } finally {
-      vi.useRealTimers();
-    }
   });
 });

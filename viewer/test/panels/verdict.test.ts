@@ -6,7 +6,7 @@ import { bodyOf, wishedOrder } from "../../src/store/draft";
 import { page } from "../page";
 import { openDocument } from "./document";
 
-const REFUSED: ForecastAnswer["order"] = { outcome: "rejected", reason: "cell 9856 at (1, 2, 3) would invert", fraction: 0.479, place: [1, 2, 3] };
+const REFUSED: ForecastAnswer["order"] = { outcome: "rejected", reason: "cell 9856 at (1, 2, 3) would invert", fraction: 0.479, min_scaled_jacobian: -0.2, place: [1, 2, 3] };
 
 describe("the foot of the form", () => {
   let made: ReturnType<typeof page>;

@@ -4,7 +4,7 @@ import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderW
 import { describe, expect, it } from "vitest";
 import { Camera } from "../../src/picture/camera";
 import type { Box, Covered } from "../../src/picture/camera";
-import { coveredBy } from "../../src/picture/overlay";
+import { coveredBy, leaveRoomFor } from "../../src/picture/overlay";
 
 const BOX: Box = [-0.05, 0.05, -0.5, 0.5, -0.1, 0.1];
 const [WIDTH, HEIGHT] = [750, 550];
@@ -77,5 +77,18 @@ describe("what lies over the picture", () => {
   it("takes no more than there is to spare", () => {
     expect(coveredBy(at(200, 50, 1000, 150), at(210, 60, 990, 120), at(300, 60, 990, 140))).toEqual({ left: 0, bottom: 0, top: 0.4, right: 0.4 });
     expect(coveredBy(at(200, 50, 600, 450), none, at(440, 200, 590, 440)).right).toBe(0);
+  });
+
+  it("takes nothing of a picture that it stands beside", () => {
+    expect(coveredBy(at(200, 50, 800, 450), none, at(812, 200, 938, 440)).right).toBe(0);
+  });
+
+  it("tells two pictures side by side how much room the bars take beside them", () => {
+    const pictures = document.createElement("div");
+    const told = (width: number): string => {
+      leaveRoomFor(Object.defineProperty(document.createElement("div"), "offsetWidth", { value: width }), pictures);
+      return pictures.style.getPropertyValue("--bars-width");
+    };
+    expect([told(126), told(0)]).toEqual(["150px", "0px"]);
   });
 });

@@ -56,6 +56,22 @@ describe("a click in the picture", () => {
     expect([made.store.state.selection.parts.wall, taken]).toEqual(["handle", []]);
   });
 
+  it("tells readers of the screen of each miss, and not of what the pointer passes over", async () => {
+    const told: (string | null)[] = [];
+    const announcer = document.getElementById("announcer")!;
+    new MutationObserver(() => told.push(announcer.textContent)).observe(announcer, { childList: true });
+    for (const click of [1, 2]) {
+      point("pointerdown", 10);
+      await drawn();
+      point("pointerup", 10);
+      await drawn();
+      expect(told.filter((text) => text !== "")).toEqual(Array.from({ length: click }, () => "That click met nothing: click on the model."));
+    }
+    point("pointermove", 110);
+    await drawn();
+    expect(told).toHaveLength(3);
+  });
+
   it("says so to a finger too, which leaves the picture with each click", () => {
     click(10);
     point("pointerleave", 10, "touch");

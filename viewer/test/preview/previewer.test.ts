@@ -17,6 +17,29 @@ class StandIn {
   fail(message: string): void { this.failed({ message }); }
 }
 
+const scene = { setPreview: () => undefined, setPreviewSurface: () => undefined, shownBones: null } as unknown as Scene;
+
+beforeEach(() => {
+  vi.stubGlobal("Worker", StandIn);
+  vi.stubGlobal("fetch", async () => new Response(new ArrayBuffer(8)));
+  return () => vi.unstubAllGlobals();
+});
+
+describe("what is wrong with a shape", () => {
+  it("is told with the features that have it", async () => {
+    const { store } = page();
+    new Previewer(scene, "surface", Promise.resolve({} as WebAssembly.Module), store).prepare();
+    await new Promise((resolve) => setTimeout(resolve, 0));
+    StandIn.last.answer({ id: "s", surface: { triangles: new Uint32Array(9), triangleFeatures: Uint32Array.from([0, 1, 9]), features: ["wall", "throat"] } });
+    const told = (...triangles: number[]): readonly string[] => {
+      StandIn.last.answer({ check: 99, faults: { text: "it folds", triangles: Uint32Array.from(triangles) } });
+      expect(store.state.preview.faults).toBe("it folds");
+      return store.state.preview.brokenIn;
+    };
+    expect([told(1), told(0, 1), told(1, 2)]).toEqual([["throat"], ["wall", "throat"], []]);
+  });
+});
+
 describe("the points of the surface, for a file", () => {
   const SURFACE = { id: "s", surface: { triangles: new Uint32Array(3), triangleFeatures: new Uint32Array(1), features: ["wall"] } };
   const points = (): PreviewAnswer => ({ shape: "s", reference: new Float64Array(9), points: new Float32Array(9) });
@@ -27,13 +50,9 @@ describe("the points of the surface, for a file", () => {
   const ask = (): void => void previewer.surfaceNow().then(({ points: found }) => said.push(`${found.length / 3} points`), (error: Error) => said.push(error.message));
 
   beforeEach(() => {
-    vi.stubGlobal("Worker", StandIn);
-    vi.stubGlobal("fetch", async () => new Response(new ArrayBuffer(8)));
     made = page();
-    const scene = { setPreview: () => undefined, setPreviewSurface: () => undefined, shownBones: null } as unknown as Scene;
     previewer = new Previewer(scene, "surface", Promise.resolve({} as WebAssembly.Module), made.store);
     said.length = 0;
-    return () => vi.unstubAllGlobals();
   });
 
   it("come once for each who asks", async () => {

@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import type { FieldInformation, Json } from "../../src/connection/protocol";
+import type { FieldInformation, ForecastAnswer, Json } from "../../src/connection/protocol";
 import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
 import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
@@ -10,7 +10,7 @@ import { runState, slowLink, whyNotSteering } from "../../src/store/run";
 import { Selection } from "../../src/store/selection";
 import { NO_PREVIEW } from "../../src/store/state";
 import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../../src/store/verdict";
-import { STATUS, feature, page } from "../page";
+import { STATUS, defaults, feature, page } from "../page";
 
 const pinch = (z: number): Json => ({ scale_direction: { features: ["throat"], fixed: [], factors: [1, 1, z], harmonic_order: 2 } });
 const FEATURES = [feature("inlet", "inflow"), feature("outlet", "outflow"), feature("walls", "wall"), feature("throat")];
@@ -378,7 +378,7 @@ describe("taking back", () => {
 });
 
 describe("the verdict", () => {
-  const refused = { outcome: "rejected" as const, reason: "cell 9856 would invert", fraction: 0.479, place: [1, 2, 3] as [number, number, number] };
+  const refused = { outcome: "rejected" as const, reason: "cell 9856 would invert", fraction: 0.479, min_scaled_jacobian: -0.2, place: [1, 2, 3] as [number, number, number] };
 
   it("is a line each of preview and forecast, with the rest folded", () => {
     const { store } = composed();
@@ -404,6 +404,29 @@ describe("the verdict", () => {
     expect(remedies(store.state)!.untangle).toBe(false);
     store.dispatch({ type: "cleared" });
     expect(store.state.draft.remedy).toEqual({});
+  });
+
+  it("offers Untangle only where that can help", () => {
+    const { store, greet } = composed();
+    const isOffered = (answer: ForecastAnswer["order"]): boolean => {
+      store.dispatch({ type: "forecast told", answer });
+      return remedies(store.state)!.untangle;
+    };
+    const { min_scaled_jacobian: _, ...broken } = refused;
+    const folds = (...brokenIn: string[]): void => store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "shown", faults: "2 pair(s) of faces intersect", brokenIn } });
+    // The edit asks for what cannot be done at all.
+    expect(isOffered({ outcome: "rejected", reason: "edits[0]: the axis has no length" })).toBe(false);
+    // The surface breaks: what is left free of it may be led another way, what the edit places may not.
+    expect(isOffered(broken)).toBe(true);
+    folds("throat", "inlet");
+    expect(isOffered(broken)).toBe(true);
+    folds("throat");
+    expect([isOffered(broken), isOffered(refused)]).toEqual([false, true]);
+    // Without a volume nothing is mended, and what the run does by itself need not be asked for.
+    greet({ defaults: { ...defaults, deform: { method: "surface" } } });
+    expect(isOffered(refused)).toBe(false);
+    greet({ defaults: { ...defaults, guard: { otherwise: "untangle" } } });
+    expect(isOffered(refused)).toBe(false);
   });
 
   it("of one order says nothing of the next", () => {
