@@ -25,7 +25,8 @@ use tombolo::{
     pipelines::language::{Order, parse_valid},
 };
 
-const MONITORED: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}, "pipelines": [
+const MONITORED: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"},
+    "units": {"inflow": "m/s"}, "pipelines": [
     {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
     {"name": "health", "every": {"steps": 1}, "stages": [{"statistics": {"field": "speed"}}]}]}"#;
 
@@ -177,7 +178,8 @@ fn a_client_watches_and_steers() {
     let run = Run::new(MONITORED);
     let client = Client::connect(&run.link, &Options::default()).expect("connected");
     client.drive(PATIENCE).expect("the wheel");
-    assert_eq!(client.hello().expect("said").parameters[0].name, "inflow");
+    let inflow = client.hello().expect("said").parameters[0].clone();
+    assert_eq!((&*inflow.name, inflow.unit.as_deref()), ("inflow", Some("m/s")));
     until(&client, "monitor", |told| match &told.event {
         Event::Monitor(values) => {
             assert_eq!(values.pipeline, "health");

@@ -26,6 +26,12 @@ fn one_drives_and_the_others_watch() {
     watcher.send(&json!({"id": "d", "drive": {}}));
     let refused = watcher.wait_for("error", |error| error["id"] == "d");
     assert!(refused["message"].as_str().unwrap().contains(name.as_str().unwrap()));
+    let asked = driver.wait_for("wheel", |_| true);
+    driver.send(&json!({"name": {"name": "Bo"}}));
+    driver.send(&json!({"keep": {"from": asked["asked_by"]}}));
+    assert_eq!(watcher.wait_for("kept", |_| true), json!({"by": name, "name": "Bo"}));
+    watcher.send(&json!({"id": "k", "keep": {"from": name}}));
+    watcher.wait_for("error", |error| error["id"] == "k");
     driver.send(&json!({"id": "seen by both", "order": squeeze(0.2)}));
     solver.step_until_told(&mut watcher, "order", |order| {
         order["id"] == "seen by both" && order["status"] == "applied"

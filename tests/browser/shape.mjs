@@ -168,6 +168,7 @@ const steps = [
     await first.picture("asked");
     check(await inSight(first, "#hand-over"), "Hand over is not in sight");
     await page.click("#keep");
+    await second.page.waitForFunction(() => document.getElementById("waiting").textContent.endsWith("keeps the wheel."));
     await second.page.click("#wheel");
     await page.waitForFunction(() => !document.getElementById("asked").hidden);
     await page.click("#hand-over");

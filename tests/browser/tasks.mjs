@@ -83,7 +83,7 @@ const steps = [
     await viewer.until("the worst cells gone", (now) => !("worst cells" in now.views));
   }],
   ["the pressure before and after stands beside the plot", async () => {
-    await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /pressure/.test(row.textContent) && /%/.test(row.textContent)));
+    await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /pressure/i.test(row.textContent) && /%/.test(row.textContent)));
     await filmed("pressure");
   }],
   ["the first of two edits is changed", async () => {

@@ -356,6 +356,7 @@ function takeMessage(message: ServerMessage): void {
     case "done": return parameters.done(message.body.id);
     case "play": return store.dispatch({ type: "played", played: message.body });
     case "wheel": return store.dispatch({ type: "wheel asked", by: message.body.asked_by });
+    case "kept": return wheel.kept(message.body);
     case "link": return void people.take(message.body);
     case "people": return store.dispatch({ type: "people", viewers: message.body.viewers });
     case "followed": return following.followed(message.body.by);

@@ -8,7 +8,7 @@ use tombolo_deform::{features::FeatureSize, names::nearest, surface::Surface};
 use super::{Adaptor, SteeredMesh};
 use crate::{
     condition::Condition,
-    steering::{Defaults, EditStack},
+    steering::{Defaults, EditStack, Parameter},
 };
 
 impl Adaptor {
@@ -33,7 +33,12 @@ impl Adaptor {
         let (changed, described) = (self.changed, Arc::clone(&self.described));
         let stream = self.config.stream.as_ref();
         let embed = stream.map(|stream| stream.embed.clone()).unwrap_or_default();
-        let (parameters, defaults) = (self.parameters.all().to_vec(), self.defaults.clone());
+        let declared = |Parameter { name, value, minimum, maximum }: &Parameter| {
+            json!({"name": name, "value": value, "minimum": minimum, "maximum": maximum,
+                   "unit": self.config.units.get(name)})
+        };
+        let parameters: Vec<_> = self.parameters.all().iter().map(declared).collect();
+        let defaults = self.defaults.clone();
         move || {
             let list = |value: &Value| if value.is_null() { json!([]) } else { value.clone() };
             let Defaults { deform, guard, schedule } = &defaults;

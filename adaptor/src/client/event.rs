@@ -10,7 +10,7 @@ use tombolo_pipelines::{
     language::{LinkFor, PinnedNote, UnpinnedNote},
 };
 
-use crate::{OrderReport, Parameter};
+use crate::OrderReport;
 
 /// Something that a run told.
 #[derive(Debug, Clone)]
@@ -107,7 +107,7 @@ pub struct Hello {
     pub monitors: Vec<MonitorName>,
     /// The parameters of the solver.
     #[serde(default)]
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<ParameterInformation>,
     /// The orders so far, the oldest first; in the first of a connection.
     #[serde(default)]
     pub orders: Vec<OrderReport>,
@@ -165,6 +165,22 @@ pub struct MonitorName {
     pub pipeline: String,
     /// Its name.
     pub name: String,
+    /// Its unit, where it is known.
+    #[serde(default)]
+    pub unit: Option<String>,
+}
+
+/// A number of the solver that can be steered.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterInformation {
+    /// Its name.
+    pub name: String,
+    /// Its value now.
+    pub value: f64,
+    /// The least value it may take.
+    pub minimum: f64,
+    /// The greatest.
+    pub maximum: f64,
     /// Its unit, where it is known.
     #[serde(default)]
     pub unit: Option<String>,

@@ -98,8 +98,9 @@ pub use crate::link::{Link, LinkError};
 use crate::stream::UNDRIVEN;
 pub use error::ClientError;
 pub use event::{
-    Complaint, Done, End, Event, Foretold, Hello, LinkTold, MonitorName, People, Person,
-    PipelinesChanged, Precision, Received, Role, StackChange, Status, StatusQuality, Values, View,
+    Complaint, Done, End, Event, Foretold, Hello, LinkTold, MonitorName, ParameterInformation,
+    People, Person, PipelinesChanged, Precision, Received, Role, StackChange, Status,
+    StatusQuality, Values, View,
 };
 use state::{Pending, Shared};
 

@@ -50,6 +50,8 @@ mod socket;
 mod stack;
 mod status;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod text;
 mod tls;
 mod together;
@@ -457,20 +459,5 @@ async fn serve(
         () = connecting => {}
         () = statuses => {}
         () = ended => {}
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_part_of_the_stream_that_panics_is_begun_again() {
-        let mut begun = 0;
-        while went_wrong("test", || {
-            begun += 1;
-            assert!(begun > 2, "a fault");
-        }) {}
-        assert_eq!(begun, 3);
     }
 }

@@ -181,6 +181,19 @@ impl Hub {
         Ok(())
     }
 
+    /// The driver has another viewer told that it keeps the wheel; the message says why not.
+    pub(super) fn keep(&self, driver: u64, from: &str) -> Result<(), String> {
+        let state = lock(&self.state);
+        if state.wheel.driver != Some(driver) {
+            return Err("only the one that drives keeps the wheel".into());
+        }
+        let called = state.together.called(driver).map(str::to_owned);
+        state
+            .named(from)?
+            .text(&Text::of(move || json!({"kept": {"by": name(driver), "name": called}})));
+        Ok(())
+    }
+
     /// The driver ends the connection of another viewer; the message says why not.
     pub(super) fn kick(&self, driver: u64, other: &str) -> Result<(), String> {
         let state = lock(&self.state);

@@ -230,7 +230,7 @@ fn is_too_long(error: axum::Error) -> bool {
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
-/// "forecast" | "withdraw_forecast" | "drive" | "hand_over" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
+/// "forecast" | "withdraw_forecast" | "drive" | "hand_over" | "keep" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
 /// "note" | "remove_note" | "views": ...}`.
 fn receive(
     text: &str,
@@ -274,6 +274,7 @@ fn receive(
             Err(watches.into())
         }
         Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
+        Ok(Said::Wheel(Wheel::Keep { from })) => hub.keep(client.id, &from),
         Ok(Said::Wheel(Wheel::Kick { client: other })) => hub.kick(client.id, &other),
         Ok(message) => commands.receive(client.id, id.clone(), message, text),
         Err(error) => Err(error.to_string()),
@@ -288,6 +289,7 @@ fn asked_for(message: &Said) -> &'static str {
         Said::Question(Question::Forecast(_)) => "forecast",
         Said::Question(Question::WithdrawForecast {}) => "withdraw_forecast",
         Said::Wheel(Wheel::HandOver { .. }) => "hand_over",
+        Said::Wheel(Wheel::Keep { .. }) => "keep",
         Said::Wheel(Wheel::Kick { .. }) => "kick",
         Said::Wheel(Wheel::Drive {} | Wheel::Here {}) => "drive",
         Said::Together(_) => "what is free to all",

@@ -50,8 +50,8 @@ pub struct Config {
     /// that are changed in it are changed in the run. Everything else needs a restart.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub watch: bool,
-    /// The units of fields, by name, such as `{"velocity": "m/s"}`. They are shown to people; nothing is
-    /// converted.
+    /// The units of fields and of the solver's parameters, by name, such as `{"velocity": "m/s"}`. They are
+    /// shown to people; nothing is converted.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
     /// The pipelines, each with the steps at which it runs.

@@ -35,6 +35,11 @@ pub enum Wheel {
         /// The other's name.
         to: String,
     },
+    /// The driver keeps the wheel, and has another told that asked for it.
+    Keep {
+        /// The other's name.
+        from: String,
+    },
     /// The driver ends another's connection.
     Kick {
         /// The other's name.
@@ -108,7 +113,7 @@ fn message(document: &Document<'_>) -> Result<Message, LanguageError> {
     };
     match key {
         "forecast" | "withdraw_forecast" => document.valid().map(Message::Question),
-        "drive" | "hand_over" | "kick" | "here" => document.value().map(Message::Wheel),
+        "drive" | "hand_over" | "keep" | "kick" | "here" => document.value().map(Message::Wheel),
         "link" | "name" | "follow" | "camera" | "note" | "remove_note" | "views" => {
             document.valid().map(Message::Together)
         }

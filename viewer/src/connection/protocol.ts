@@ -11,7 +11,7 @@ export interface ViewInformation { name: string; kind: string }
 export type Condition = "inflow" | "outflow" | "wall";
 export interface FeatureInformation { name: string; faces: number; vertices: number; bounds: [Vector, Vector]; condition?: Condition | null }
 export interface FieldInformation { name: string; association: Association; components: number; unit?: string | null }
-export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null }
+export interface ParameterInformation { name: string; value: number; minimum?: number | null; maximum?: number | null; unit?: string | null }
 
 /** The surface from which shapes are measured; its points are sent on request only. */
 export interface SurfaceInformation { id: string; vertices: number; faces: number }
@@ -152,6 +152,9 @@ export interface ServerError { message: string; id?: string | null }
 /** Another viewer asks the one that drives for the wheel. */
 export interface WheelAsked { asked_by: string; name?: string | null }
 
+/** The one that drives keeps the wheel that this viewer asked for. */
+export interface WheelKept { by: string; name?: string | null }
+
 /** Where in a recording the viewer is. */
 export interface Played extends RecordedMoment { speed: number; paused: boolean; at_end: boolean }
 
@@ -170,6 +173,7 @@ export type ServerMessage =
   | { kind: "pipelines"; body: PipelineChange }
   | { kind: "done"; body: Done }
   | { kind: "wheel"; body: WheelAsked }
+  | { kind: "kept"; body: WheelKept }
   | { kind: "link"; body: LinkTold }
   | { kind: "people"; body: { viewers: Person[] } }
   | { kind: "followed"; body: { by: number } }
@@ -184,7 +188,7 @@ export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { withdraw_forecast: object } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
   | { play: { seek?: { seconds: number }; speed?: number; paused?: boolean } }
-  | { hand_over: { to: string } } | { kick: { client: string } } | { here: object }
+  | { hand_over: { to: string } } | { keep: { from: string } } | { kick: { client: string } } | { here: object }
   | { link: { for: LinkFor } } | { name: { name: string } } | { follow: { on: boolean } } | { camera: ToldCamera }
   | { note: { text: string; at: Vector; cycle?: number } } | { remove_note: { number: number } }
   | { views: { names?: string[] } }
@@ -250,7 +254,7 @@ export function parseServerMessage(text: string): ServerMessage {
     throw new ProtocolError("a text message that is not JSON");
   }
   if (!isObject(parsed)) throw new ProtocolError("a text message that is not a JSON object");
-  for (const kind of ["hello", "status", "order", "parameters", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "done", "play", "end", "error",
+  for (const kind of ["hello", "status", "order", "parameters", "stack", "precision", "forecast", "monitor", "pipelines", "wheel", "kept", "done", "play", "end", "error",
     "link", "people", "followed", "camera", "note", "note_removed"] as const) {
     const body: unknown = parsed[kind];
     if (body === undefined) continue;

@@ -39,7 +39,7 @@ export class ParameterPanel {
   private readonly asked = new Map<string, string>();
 
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>, private readonly commands: Commands) {
-    const shape = (state: State): unknown => state.hello?.parameters.map(({ name, minimum, maximum }) => [name, minimum, maximum]) ?? [];
+    const shape = (state: State): unknown => state.hello?.parameters.map(({ name, minimum, maximum, unit }) => [name, minimum, maximum, unit]) ?? [];
     store.watch(shape, () => this.build(store.state.hello?.parameters ?? []), sameJson);
     store.watch((state) => state.hello?.parameters ?? [], (parameters) => this.show(parameters), sameJson);
     store.watch(whyNotSteering, (why) => this.allow(why));
@@ -147,7 +147,7 @@ export class ParameterPanel {
       oninput: () => {
         row.isSliding = true;
         input.value = numberText(valueOf(Number(slider!.value) / STEPS, bounds));
-        slider!.setAttribute("aria-valuetext", input.value);
+        slider!.setAttribute("aria-valuetext", `${input.value} ${parameter.unit ?? ""}`.trim());
         mark(input, wrong, "");
       },
       onchange: () => {
@@ -168,8 +168,9 @@ export class ParameterPanel {
     const row: Row = { input, slider, isSliding: false, placed: slider?.value ?? "", bounds, wrong, told: parameter.value, text: input.value, pending: null };
     this.rows.set(parameter.name, row);
     this.slide(row, parameter.value);
+    const range = `${bounds ? `${digits(bounds[0], 3)} to ${digits(bounds[1], 3)}` : ""} ${parameter.unit ?? ""}`.trim();
     return element("div", { class: "field" }, element("label", { for: id }, words(parameter.name),
-      bounds ? element("small", {}, `${digits(bounds[0], 3)} to ${digits(bounds[1], 3)}`) : null), input, slider, wrong);
+      range === "" ? null : element("small", {}, range)), input, slider, wrong);
   }
 
   /** Sends a value that was typed or slid to. */

@@ -1,5 +1,5 @@
 /** The wheel: a watcher asks for it, the one who steers hands it over or keeps it, and the simulation hears that somebody is there. */
-import type { ClientMessage } from "../connection/protocol";
+import type { ClientMessage, WheelKept } from "../connection/protocol";
 import { part, write } from "../dom";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
@@ -10,7 +10,7 @@ import type { Store } from "../store/store";
 
 /** The least time between two signs of being there, in milliseconds. */
 const SIGN_PERIOD = 10000;
-/** For how long it is said that an answer is waited for, in milliseconds: one who keeps the wheel does not say so. */
+/** For how long it is said that an answer is waited for, or that the wheel is kept, in milliseconds. */
 const WAITING = 60000;
 
 export class WheelPanel {
@@ -23,7 +23,7 @@ export class WheelPanel {
     part("wheel").addEventListener("click", () => { this.asked = commands.askToSteer(); });
     part("hand-over").addEventListener("click", () => this.answer((other) => ({ hand_over: { to: other } })));
     part("dismiss").addEventListener("click", () => this.answer((other) => ({ kick: { client: other } })));
-    part("keep").addEventListener("click", () => this.answer(() => ({ here: {} })));
+    part("keep").addEventListener("click", () => this.answer((other) => ({ keep: { from: other } })));
     for (const kind of ["pointermove", "pointerdown", "wheel", "keydown"]) {
       window.addEventListener(kind, () => this.here(), { passive: true, capture: true });
     }
@@ -40,6 +40,11 @@ export class WheelPanel {
     if (id !== this.asked) return false;
     this.say(`${text}.`);
     return true;
+  }
+
+  /** The one who steers keeps the wheel. */
+  kept({ by }: WheelKept): void {
+    if (mayAsk(this.store.state)) this.say(`${capital(titleOf(this.store.state, by))} keeps the wheel.`);
   }
 
   private say(text: string): void {

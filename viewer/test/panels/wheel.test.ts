@@ -67,6 +67,17 @@ describe("the wheel", () => {
       expect(waiting()).toBeNull();
     });
 
+    it("is kept, and it says so in the place of waiting", () => {
+      at("wheel").click();
+      panel.told(String(made.sent.at(-1)!.id), "c4 steers, and was asked");
+      made.store.dispatch({ type: "people", viewers: [{ client: "c4", name: "Anna", role: "driver", may_drive: true }] });
+      panel.kept({ by: "c4", name: "Anna" });
+      expect([at("waiting").hidden, at("waiting").textContent]).toEqual([false, "Anna (c4) keeps the wheel."]);
+      made.greet({ role: "driver" });
+      panel.kept({ by: "c4" });
+      expect(at("waiting").hidden).toBe(true);
+    });
+
     it("is not told that somebody is there", () => {
       window.dispatchEvent(new Event("pointermove"));
       expect(made.sent).toEqual([]);
@@ -82,7 +93,7 @@ describe("the wheel", () => {
 
     it("is handed over or kept, or the one who asks is sent away: each answers", () => {
       expect([at("asked").hidden, at("asked-text").textContent]).toEqual([false, "Anna (c4) asks to steer."]);
-      for (const [button, message] of [["hand-over", { hand_over: { to: "c4" } }], ["keep", { here: {} }], ["dismiss", { kick: { client: "c4" } }]] as const) {
+      for (const [button, message] of [["hand-over", { hand_over: { to: "c4" } }], ["keep", { keep: { from: "c4" } }], ["dismiss", { kick: { client: "c4" } }]] as const) {
         made.store.dispatch({ type: "wheel asked", by: "c4" });
         expect(at("asked").hidden, button).toBe(false);
         at(button).click();

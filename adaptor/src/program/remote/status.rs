@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::client::{Client, Drives, Event, Hello, Status};
+use crate::client::{Client, Drives, Event, Hello, ParameterInformation, Status};
 
 use super::{ANSWER, Target, connect, failed};
 use crate::program::{Failure, say};
@@ -75,8 +75,9 @@ pub(super) fn rounded(time: f64) -> f64 {
 
 fn describe(hello: &Hello) -> Result<(), Failure> {
     for parameter in &hello.parameters {
-        let crate::Parameter { name, value, minimum, maximum } = parameter;
-        say(format_args!("parameter {name}: {value}, from {minimum} to {maximum}"))?;
+        let ParameterInformation { name, value, minimum, maximum, unit } = parameter;
+        let unit = unit.iter().map(|unit| format!(" {unit}")).collect::<String>();
+        say(format_args!("parameter {name}: {value}, from {minimum} to {maximum}{unit}"))?;
     }
     for order in &hello.orders {
         say(super::order::line(order))?;

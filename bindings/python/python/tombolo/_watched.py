@@ -158,7 +158,7 @@ class Watched:
     def parameters(self) -> dict[str, Parameter]:
         """The numbers of the solver that can be steered."""
         told = self._state.hello.get("parameters", [])
-        return {it["name"]: Parameter(it["value"], it["minimum"], it["maximum"]) for it in told}
+        return {it["name"]: Parameter(it["value"], it["minimum"], it["maximum"], it.get("unit")) for it in told}
 
     @property
     def stack(self) -> list[dict[str, Any]]:

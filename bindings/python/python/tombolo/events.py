@@ -21,7 +21,20 @@ __all__ = ["Event"]
 
 _KINDS = (
     *("hello", "status", "order", "parameters", "stack", "monitor", "forecast", "pipelines", "done", "people"),
-    *("camera", "wheel", "followed", "note", "note_removed", "link", "play", "precision", "error", "end", "frame"),
+    *(
+        "camera",
+        "wheel",
+        "kept",
+        "followed",
+        "note",
+        "note_removed",
+        "link",
+        "play",
+        "precision",
+        "error",
+        "end",
+        "frame",
+    ),
     *("lost", "ended"),
 )
 
@@ -33,9 +46,10 @@ class Event(NamedTuple):
     ----------
     kind : str
         `hello`, `status`, `order`, `parameters`, `stack`, `monitor`, `forecast`, `pipelines`, `done`, `people`,
-        `camera`, `wheel` (somebody asks for it), `followed`, `note`, `note_removed`, `link`, `play`, `precision`,
-        `error`, `end`, `frame`, `lost` (the connection was lost, and is made again), `ended` (nothing comes after it),
-        or the name of a message that this version does not know, which comes where all kinds are asked for.
+        `camera`, `wheel` (somebody asks for it), `kept` (the driver keeps it), `followed`, `note`, `note_removed`,
+        `link`, `play`, `precision`, `error`, `end`, `frame`, `lost` (the connection was lost, and is made again),
+        `ended` (nothing comes after it), or the name of a message that this version does not know, which comes where
+        all kinds are asked for.
     data : dict, View or str
         The message as a dict, as docs/protocol.md says it; of a `frame` the `View`, of `lost` and `ended` the reason.
     """

@@ -73,12 +73,13 @@ class Status(NamedTuple):
 class Parameter(NamedTuple):
     """A number of the solver that can be steered: its value now, and the least and greatest it may take.
 
-    All three are in the unit that the solver has it in.
+    All three are in the unit that the solver has it in; `unit` says which, where the run's configuration does.
     """
 
     value: float
     minimum: float
     maximum: float
+    unit: Optional[str] = None
 
 
 class State:
