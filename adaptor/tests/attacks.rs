@@ -177,6 +177,7 @@ fn one_with_the_secret_for_watching_never_commands() {
         json!({"stop": {}}),
         json!({"pipelines": {"remove": ["boundary"]}}),
         json!({"hand_over": {"to": "c1"}}),
+        json!({"keep": {}}),
         json!({"kick": {"client": "c2"}}),
     ]
     .into_iter()

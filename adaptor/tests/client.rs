@@ -196,6 +196,15 @@ fn a_client_watches_and_steers() {
         _ => None,
     });
     assert_eq!(foretold.quality.map(|quality| quality.inverted), Some(0));
+    // More than may wait for an answer: none of them does for ever.
+    for _ in 0..150 {
+        client.forecast(&order(0.2)).expect("sent");
+        let withdrawn = client.withdraw_forecast().expect("sent");
+        until(&client, "done", |told| match &told.event {
+            Event::Done(done) => (done.id == withdrawn).then_some(()),
+            _ => None,
+        });
+    }
     applied(&client, &client.order(&order(0.3)).expect("sent"));
     applied(&client, &client.undo(std::num::NonZeroU32::MIN).expect("sent"));
     let refused = client.set("inflaw", 2.0).expect("sent");

@@ -27,11 +27,15 @@ fn one_drives_and_the_others_watch() {
     let refused = watcher.wait_for("error", |error| error["id"] == "d");
     assert!(refused["message"].as_str().unwrap().contains(name.as_str().unwrap()));
     let asked = driver.wait_for("wheel", |_| true);
+    assert_eq!(asked["asked_by"], "c2");
     driver.send(&json!({"name": {"name": "Bo"}}));
-    driver.send(&json!({"keep": {"from": asked["asked_by"]}}));
+    driver.send(&json!({"keep": {}}));
     assert_eq!(watcher.wait_for("kept", |_| true), json!({"by": name, "name": "Bo"}));
-    watcher.send(&json!({"id": "k", "keep": {"from": name}}));
+    driver.send(&json!({"keep": {}}));
+    watcher.send(&json!({"id": "k", "keep": {}}));
     watcher.wait_for("error", |error| error["id"] == "k");
+    let again = watcher.look_for("kept", Duration::from_millis(1), |_| true);
+    assert_eq!(again, None, "who was answered did not ask again");
     driver.send(&json!({"id": "seen by both", "order": squeeze(0.2)}));
     solver.step_until_told(&mut watcher, "order", |order| {
         order["id"] == "seen by both" && order["status"] == "applied"

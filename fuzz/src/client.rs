@@ -74,6 +74,7 @@ pub(crate) fn event_seeds(seeds: &Seeds) -> Vec<Vec<u8>> {
         json!({"note_removed": {"number": 1}}),
         json!({"error": {"message": "wrong", "id": "c"}}),
         json!({"wheel": {"asked_by": "c2", "name": null}}),
+        json!({"kept": {"by": "c1", "name": null}}),
         json!({"end": {"how": "finished", "cycle": 11, "time": 0.11}}),
     ];
     let lines = |said: Vec<String>| {

@@ -187,6 +187,8 @@ fn messages(seeds: &Seeds) -> impl Iterator<Item = Vec<u8>> {
     let others = [
         json!({"id": "a", "order": order}),
         json!({"id": "b", "forecast": order}),
+        json!({"withdraw_forecast": {}}),
+        json!({"keep": {}}),
         json!({"cancel": {"id": "a"}}),
         json!({"parameter": {"name": "heating", "value": 2.0}}),
         json!({"pause": {}}),

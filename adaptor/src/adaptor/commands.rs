@@ -19,7 +19,7 @@ use crate::{
     changes::{Changes, make_absolute},
     meeting,
     steering::{
-        Asked, Forecaster, Log, OVERTAKEN, Queue, Received, Reservation, Source, taken_back,
+        Asked, Forecaster, Log, OVERTAKEN, Queue, Received, Reservation, Source, WITHDRAWN, taken_back,
     },
     step::Moment,
     stream::{CommandSink, Hub},
@@ -218,9 +218,9 @@ impl Adaptor {
                 }
                 _ => Err(NO_MESH),
             };
-            if let (Some(Asked { client, id, .. }), Some(hub)) = (question, &self.hub)
-                && self.queue.is_wanted(*client)
-            {
+            if let (Some(Asked { client, id, .. }), Some(hub)) = (question, &self.hub) {
+                let forecast =
+                    if self.queue.is_wanted(*client) { forecast } else { Err(WITHDRAWN) };
                 tell_forecast(hub, *client, id.clone(), forecast);
             }
         }
@@ -403,8 +403,12 @@ impl Intake {
         }
     }
 
-    /// Lets go of what a viewer wanted to know.
+    /// Lets go of what a viewer wanted to know, and tells it so.
     fn withdraw_forecast(&self, client: u64) {
+        // One that the ranks have taken up is answered where they leave it.
+        for Asked { id, .. } in self.queue.withdraw(client) {
+            tell_forecast(&self.hub, client, id, Err(WITHDRAWN));
+        }
         self.forecaster.get().into_iter().for_each(|forecaster| forecaster.withdraw(client));
     }
 
@@ -483,6 +487,11 @@ impl CommandSink for Intake {
             }
             Message::Question(Question::WithdrawForecast {}) => {
                 self.withdraw_forecast(client);
+                if let Some(id) = id {
+                    let Moment { cycle, time } = self.hub.clock.get();
+                    let done = move || json!({"done": {"id": id, "cycle": cycle, "time": time}});
+                    self.hub.tell_client(client, done);
+                }
                 return Ok(());
             }
             Message::Command(command) => command,

@@ -317,8 +317,8 @@ impl Client {
         self.say(&json!(Question::Forecast(order.clone())))
     }
 
-    /// Wants to know no more what it asked for last: the run gives that forecast up, and does not answer it
-    /// unless the answer is on its way.
+    /// Takes back the forecasts that it asked for: the run gives them up, and answers each with an error,
+    /// unless its answer is on its way. The answer to this is an [`Event::Done`] of the id.
     ///
     /// # Errors
     /// As of [`Client::send`].

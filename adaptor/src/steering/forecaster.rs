@@ -49,8 +49,7 @@ impl Forecaster {
         }
     }
 
-    /// Gives up the forecasts of an asker who is gone, or wants to know them no more. None is answered
-    /// afterwards.
+    /// Gives up the forecasts of an asker who has taken them back, or is gone.
     pub(crate) fn withdraw(&self, asker: u64) {
         match &self.planning {
             Planning::Beside(jobs) => jobs.withdraw(asker),

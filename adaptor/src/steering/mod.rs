@@ -53,7 +53,7 @@ pub(crate) use stack::EditStack;
 pub(crate) use steerer::{SavedSteering, Steerer};
 pub(crate) use timed::{Timed, hash_of, without_carried_out};
 pub(crate) use together::taken_back;
-pub(crate) use worker::OVERTAKEN;
+pub(crate) use worker::{OVERTAKEN, WITHDRAWN};
 
 /// Seconds since the first call of this function: the clock of a
 /// [`Shaper`](tombolo_deform::shape::Shaper).

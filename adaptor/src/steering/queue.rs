@@ -42,7 +42,7 @@ pub(crate) struct Asked {
 #[derive(Debug, Default)]
 struct Questions {
     waiting: Vec<Asked>,
-    /// Those who asked what the ranks have taken up together, until it is answered.
+    /// Those who asked what the ranks have taken up together last.
     taken_up: Vec<u64>,
 }
 
@@ -125,11 +125,14 @@ impl Queue {
         taken
     }
 
-    /// Lets go of what a client wanted to know.
-    pub(super) fn withdraw(&self, client: u64) {
+    /// Lets go of what a client wanted to know; returns what the ranks have not taken up.
+    pub(crate) fn withdraw(&self, client: u64) -> Vec<Asked> {
         let mut questions = lock(&self.questions);
-        questions.waiting.retain(|asked| asked.client != client);
         questions.taken_up.retain(|&asker| asker != client);
+        let waiting = std::mem::take(&mut questions.waiting);
+        let (withdrawn, others) = waiting.into_iter().partition(|asked| asked.client == client);
+        questions.waiting = others;
+        withdrawn
     }
 
     /// Whether a client still wants to know what the ranks have taken up.

@@ -81,14 +81,15 @@ impl PlanTogether {
         self.give_up_one(&UnderWay::Order(order.to_owned()));
     }
 
-    /// Gives up the forecast that a client asked for.
+    /// Gives up the forecast that a client asked for, which is not in the queue any more.
     pub(super) fn withdraw(&self, client: u64) {
-        self.queue.withdraw(client);
         self.give_up_one(&UnderWay::Forecast(client));
     }
 
     fn give_up_one(&self, what: &UnderWay) {
-        if lock(&self.state).under_way.as_ref() == Some(what) {
+        // Locked until it is cancelled: what comes next must not be.
+        let state = lock(&self.state);
+        if state.under_way.as_ref() == Some(what) {
             self.cancellation.cancel();
         }
     }

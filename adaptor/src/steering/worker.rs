@@ -53,6 +53,8 @@ const LONG: Duration = Duration::from_secs(2);
 /// Why a forecast is not answered.
 pub(crate) const OVERTAKEN: &str =
     "a later forecast of the same client has taken the place of this one";
+/// Why a forecast is not answered that its asker has taken back.
+pub(crate) const WITHDRAWN: &str = "the client has withdrawn this forecast";
 const GONE: &str = "the mesh whose shape could be changed is gone";
 
 /// A forecast that waits, and who asked for it.
@@ -78,8 +80,8 @@ enum GivenUp {
     Delayed,
     /// Its asker wants to know something else.
     Overtaken,
-    /// Its asker is gone.
-    Unwanted,
+    /// Its asker has taken it back, or is gone.
+    Withdrawn,
 }
 
 /// The jobs that wait, by how urgent they are.
@@ -203,12 +205,19 @@ impl Jobs {
         }
     }
 
-    /// Lets go of the forecasts of an asker who is gone.
+    /// Gives up the forecasts of an asker who has taken them back, or is gone, and says so.
     pub(crate) fn withdraw(&self, asker: u64) {
-        self.change(|state| {
-            state.forecasts.retain(|waiting| waiting.asker != asker);
-            self.give_forecast_up(state, GivenUp::Unwanted, |underway| underway.asker == asker);
+        // Told once the lock is free.
+        let withdrawn: Vec<Question> = self.change(|state| {
+            self.give_forecast_up(state, GivenUp::Withdrawn, |underway| underway.asker == asker);
+            let (withdrawn, others) =
+                state.forecasts.drain(..).partition(|waiting| waiting.asker == asker);
+            state.forecasts = others;
+            withdrawn
         });
+        for Question { answer, .. } in withdrawn {
+            answer(Err(WITHDRAWN));
+        }
     }
 
     /// Answers a question with what was found, unless it was given up.
@@ -224,7 +233,7 @@ impl Jobs {
                     return state.forecasts.push_front(question);
                 }
                 Err(GivenUp::Delayed | GivenUp::Overtaken) => (question, Err(OVERTAKEN)),
-                Err(GivenUp::Unwanted) => return,
+                Err(GivenUp::Withdrawn) => (question, Err(WITHDRAWN)),
             }
         };
         (question.answer)(told);
@@ -267,6 +276,7 @@ impl Jobs {
             state.forecasts.push_back(question);
             self.give_forecast_up(state, GivenUp::Overtaken, |underway| {
                 underway.asker == asker
+                    && underway.given_up.is_none()
                     && underway.begun.is_some_and(|begun| begun.elapsed() >= LONG)
             });
             overtaken.map(|overtaken| (overtaken, OVERTAKEN))

@@ -270,7 +270,7 @@ impl Hub {
         self.viewers.load(Ordering::Relaxed)
     }
 
-    /// Notes which views somebody looks at, and how many look, where that may have changed.
+    /// Notes which views somebody looks at, and how many are connected, where that may have changed.
     pub(super) fn note_audience(&self, state: &HubState) {
         self.viewers.store(state.clients.len() as u64, Ordering::Relaxed);
         let of_each = state.audience().map(|client| client.audience());

@@ -189,7 +189,7 @@ pub enum StreamError {
 /// How long the end of a run waits for viewers to read that it ended.
 const END_TIME: Duration = Duration::from_secs(1);
 
-/// Viewers beside whom the stream's thread gathers what comes within [`GATHERED`].
+/// With more viewers than these the stream's thread waits for [`GATHERED`] whenever it wakes up.
 const MANY: u64 = 8;
 /// How long the thread gathers what is said to many viewers, and what they say, before it goes on. It
 /// takes a core that may be the solver's each time it wakes up, and many viewers answer each frame.

@@ -37,8 +37,8 @@ const WATCHED_SIZE: usize = 1 << 16;
 /// Bytes of a viewer that are read at once. They are cleared before each read, on a core that may be the
 /// solver's, and most messages are a few bytes.
 const READ_BUFFER: usize = 1 << 12;
-/// Bytes for a viewer that are gathered before they are sent. Frames among them are not the newest when
-/// the viewer reads them.
+/// Bytes for a viewer that are gathered before they are sent. A frame among them makes way for no newer
+/// one.
 const WRITE_BUFFER: usize = 1 << 15;
 
 /// All routes, behind the gate.

@@ -58,6 +58,7 @@ impl HubState {
 
     fn take_wheel(&mut self, client: u64) {
         self.wheel.driver = Some(client);
+        self.wheel.asking.clear();
         self.wheel.heard = Some(Instant::now());
         self.wheel.lost = None;
         self.status_dirty = true;
@@ -85,6 +86,7 @@ impl Hub {
             return false;
         }
         state.clients.remove(&client.id);
+        state.wheel.asking.remove(&client.id);
         self.note_audience(&state);
         if state.wheel.driver == Some(client.id) {
             state.wheel.driver = None;
@@ -140,6 +142,7 @@ impl Hub {
         match state.wheel.driver {
             Some(driver) if driver == client => Ok(()),
             Some(driver) if !state.wheel.is_silent() => {
+                state.wheel.asking.insert(client);
                 if let Some(driver) = state.clients.get(&driver) {
                     let called = state.together.called(client).map(str::to_owned);
                     driver.text(&Text::of(
@@ -181,16 +184,17 @@ impl Hub {
         Ok(())
     }
 
-    /// The driver has another viewer told that it keeps the wheel; the message says why not.
-    pub(super) fn keep(&self, driver: u64, from: &str) -> Result<(), String> {
-        let state = lock(&self.state);
+    /// The driver has those told that it keeps the wheel who asked for it; the message says why not.
+    pub(super) fn keep(&self, driver: u64) -> Result<(), String> {
+        let mut state = lock(&self.state);
         if state.wheel.driver != Some(driver) {
             return Err("only the one that drives keeps the wheel".into());
         }
         let called = state.together.called(driver).map(str::to_owned);
-        state
-            .named(from)?
-            .text(&Text::of(move || json!({"kept": {"by": name(driver), "name": called}})));
+        let text = Text::of(move || json!({"kept": {"by": name(driver), "name": called}}));
+        for client in std::mem::take(&mut state.wheel.asking) {
+            state.clients.get(&client).into_iter().for_each(|client| client.text(&text));
+        }
         Ok(())
     }
 

@@ -274,7 +274,7 @@ fn receive(
             Err(watches.into())
         }
         Ok(Said::Wheel(Wheel::HandOver { to })) => hub.hand_over(client.id, &to),
-        Ok(Said::Wheel(Wheel::Keep { from })) => hub.keep(client.id, &from),
+        Ok(Said::Wheel(Wheel::Keep {})) => hub.keep(client.id),
         Ok(Said::Wheel(Wheel::Kick { client: other })) => hub.kick(client.id, &other),
         Ok(message) => commands.receive(client.id, id.clone(), message, text),
         Err(error) => Err(error.to_string()),
@@ -286,8 +286,7 @@ fn receive(
 fn asked_for(message: &Said) -> &'static str {
     match message {
         Said::Command(command) => command.name(),
-        Said::Question(Question::Forecast(_)) => "forecast",
-        Said::Question(Question::WithdrawForecast {}) => "withdraw_forecast",
+        Said::Question(_) => "forecast",
         Said::Wheel(Wheel::HandOver { .. }) => "hand_over",
         Said::Wheel(Wheel::Keep { .. }) => "keep",
         Said::Wheel(Wheel::Kick { .. }) => "kick",

@@ -7,6 +7,9 @@ use tokio_tungstenite::tungstenite;
 
 use super::*;
 
+/// How long a test waits before it fails.
+const PATIENCE: Duration = Duration::from_secs(60);
+
 #[test]
 fn a_part_of_the_stream_that_panics_is_begun_again() {
     let mut begun = 0;
@@ -53,11 +56,15 @@ fn first_text(server: &Server) -> Option<String> {
     let url = server.link().replacen("http://", "ws://", 1).replacen("/?", "/ws?", 1);
     let address = server.address().expect("an address");
     let stream = std::net::TcpStream::connect(address).expect("connected");
+    stream.set_read_timeout(Some(PATIENCE)).expect("set");
     let (mut socket, _) = tungstenite::client(url, stream).expect("let in");
     loop {
         match socket.read() {
             Ok(tungstenite::Message::Text(text)) => return Some(text.to_string()),
             Ok(_) => {}
+            Err(tungstenite::Error::Io(error)) if error.kind() == io::ErrorKind::WouldBlock => {
+                panic!("nothing is said");
+            }
             Err(_) => return None,
         }
     }
@@ -72,15 +79,17 @@ fn viewers_are_served_by_a_server_with_faults() {
     hub.describe(Map::new);
     let commands: Arc<dyn CommandSink> = Arc::clone(&faulty) as Arc<_>;
     let server = Server::start(&settings, Arc::clone(&hub), commands).unwrap();
-    while faulty.looked.load(Ordering::Relaxed) < 2 {
-        std::thread::sleep(STATUS_PERIOD);
-    }
+    let looks = |times: usize| {
+        let (begun, before) = (std::time::Instant::now(), faulty.looked.load(Ordering::Relaxed));
+        while faulty.looked.load(Ordering::Relaxed) < before + times {
+            assert!(begun.elapsed() < PATIENCE, "nobody looks at the time any more");
+            std::thread::sleep(STATUS_PERIOD);
+        }
+    };
+    looks(2);
     assert_eq!(first_text(&server), None);
     let greeted = first_text(&server).unwrap();
     assert!(greeted.contains("hello"), "{greeted}");
-    let looked = faulty.looked.load(Ordering::Relaxed);
-    while faulty.looked.load(Ordering::Relaxed) == looked {
-        std::thread::sleep(STATUS_PERIOD);
-    }
+    looks(1);
     drop(server);
 }

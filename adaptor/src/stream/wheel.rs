@@ -1,7 +1,7 @@
 //! Who drives, and who may come back for the wheel.
 
 use std::{
-    collections::VecDeque,
+    collections::{BTreeSet, VecDeque},
     time::{Duration, Instant},
 };
 
@@ -20,6 +20,8 @@ pub(super) struct Wheel {
     pub(super) heard: Option<Instant>,
     /// When the driver's connection was lost, and whose it was.
     pub(super) lost: Option<(Instant, u64)>,
+    /// Those who have asked the driver for the wheel, and were not answered.
+    pub(super) asking: BTreeSet<u64>,
     /// How long a driver may be silent.
     pub(super) silence: Duration,
     /// Clients that have left, the oldest first.

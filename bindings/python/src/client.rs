@@ -225,6 +225,11 @@ impl Client {
         guarded(|| py.detach(|| self.client.forecast(order).map_err(of_client)))
     }
 
+    /// Takes back the forecasts that it asked for; returns the id of what is done then.
+    fn withdraw_forecast(&self) -> PyResult<String> {
+        self.client.withdraw_forecast().map_err(of_client)
+    }
+
     /// Takes the last orders back; returns the id of the order that does so.
     fn undo(&self, count: u32) -> PyResult<String> {
         let count = NonZeroU32::new(count).ok_or_else(|| {

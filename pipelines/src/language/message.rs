@@ -35,11 +35,8 @@ pub enum Wheel {
         /// The other's name.
         to: String,
     },
-    /// The driver keeps the wheel, and has another told that asked for it.
-    Keep {
-        /// The other's name.
-        from: String,
-    },
+    /// The driver keeps the wheel, and has those told who asked for it.
+    Keep {},
     /// The driver ends another's connection.
     Kick {
         /// The other's name.

@@ -213,6 +213,6 @@ impl Command {
 pub enum Question {
     /// Asks what an order would come to, were it given now.
     Forecast(Order),
-    /// Wants to know no more what it asked for last.
+    /// Takes back the forecasts that were asked for.
     WithdrawForecast {},
 }

@@ -5,7 +5,7 @@ import { capital } from "../store/run";
 
 /** What a measure is called, where its name in the JSON is no word (`pipelines/src/language`). */
 const MEASURES: Readonly<Record<string, string>> = {
-  min: "minimum", max: "maximum", l2: "RMS", rms: "RMS", non_finite: "values that are no number", inverted: "inverted cells",
+  min: "minimum", max: "maximum", l2: "RMS", rms: "RMS over time", non_finite: "values that are no number", inverted: "inverted cells",
 };
 
 /** Names as short as symbols, such as `p` or `Cd`, stay as they are: a capital would be another symbol. */

@@ -37,7 +37,7 @@ export class ValueTable {
       const parts = this.rows[index] ?? this.append();
       parts.sign.style.background = colour;
       write(parts.name, name);
-      // It is cut off where the numbers leave it too little room.
+      // A long word is cut off where the numbers leave it too little room.
       parts.head.title = title;
       parts.cells.forEach((cell, i) => write(cell, cells[i] ?? ""));
       const last = parts.cells.at(-1);

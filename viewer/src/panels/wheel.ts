@@ -23,7 +23,7 @@ export class WheelPanel {
     part("wheel").addEventListener("click", () => { this.asked = commands.askToSteer(); });
     part("hand-over").addEventListener("click", () => this.answer((other) => ({ hand_over: { to: other } })));
     part("dismiss").addEventListener("click", () => this.answer((other) => ({ kick: { client: other } })));
-    part("keep").addEventListener("click", () => this.answer((other) => ({ keep: { from: other } })));
+    part("keep").addEventListener("click", () => this.answer(() => ({ keep: {} })));
     for (const kind of ["pointermove", "pointerdown", "wheel", "keydown"]) {
       window.addEventListener(kind, () => this.here(), { passive: true, capture: true });
     }
@@ -44,13 +44,17 @@ export class WheelPanel {
 
   /** The one who steers keeps the wheel. */
   kept({ by }: WheelKept): void {
-    if (mayAsk(this.store.state)) this.say(`${capital(titleOf(this.store.state, by))} keeps the wheel.`);
+    if (this.asked === null || !mayAsk(this.store.state)) return;
+    this.asked = null;
+    this.say(`${capital(titleOf(this.store.state, by))} keeps the wheel.`);
   }
 
   private say(text: string): void {
     clearTimeout(this.waiting);
     write(part("waiting"), text);
     part("waiting").hidden = text === "";
+    // Where the page is narrow it stands in a drawer, which may be closed.
+    if (text !== "") write(part("announcer"), text);
     if (text !== "") this.waiting = window.setTimeout(() => this.say(""), WAITING);
   }
 

@@ -46,7 +46,7 @@ export class Forecasts {
     if (before !== null) this.overtaken.add(before);
     this.asked = null;
     if (order === null || !steering) {
-      if (before !== null && !this.isGiven()) this.questions.withdraw();
+      if (this.overtaken.size > 0 && !this.isGiven()) this.questions.withdraw();
       return this.store.dispatch({ type: "forecast cleared" });
     }
     this.store.dispatch({ type: "forecast asked" });

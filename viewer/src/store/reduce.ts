@@ -62,7 +62,10 @@ function after(state: State, action: Action): State {
     case "played": return { ...state, played: action.played };
     case "end": return { ...state, ...NOBODY, end: action.end, askedBy: null };
     case "wheel asked": return { ...state, askedBy: action.by };
-    case "people": return { ...state, people: action.viewers };
+    case "people": {
+      const isThere = action.viewers.some(({ client }) => client === state.askedBy);
+      return { ...state, people: action.viewers, askedBy: isThere ? state.askedBy : null };
+    }
     case "followed": return { ...state, followedBy: action.by };
     case "following": return { ...state, following: action.on };
     case "note pinned": return { ...state, notes: [...state.notes.filter(({ number }) => number !== action.note.number), action.note] };

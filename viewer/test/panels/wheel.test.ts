@@ -68,6 +68,8 @@ describe("the wheel", () => {
     });
 
     it("is kept, and it says so in the place of waiting", () => {
+      panel.kept({ by: "c4" });
+      expect(at("waiting").hidden).toBe(true);
       at("wheel").click();
       panel.told(String(made.sent.at(-1)!.id), "c4 steers, and was asked");
       made.store.dispatch({ type: "people", viewers: [{ client: "c4", name: "Anna", role: "driver", may_drive: true }] });
@@ -93,7 +95,7 @@ describe("the wheel", () => {
 
     it("is handed over or kept, or the one who asks is sent away: each answers", () => {
       expect([at("asked").hidden, at("asked-text").textContent]).toEqual([false, "Anna (c4) asks to steer."]);
-      for (const [button, message] of [["hand-over", { hand_over: { to: "c4" } }], ["keep", { keep: { from: "c4" } }], ["dismiss", { kick: { client: "c4" } }]] as const) {
+      for (const [button, message] of [["hand-over", { hand_over: { to: "c4" } }], ["keep", { keep: {} }], ["dismiss", { kick: { client: "c4" } }]] as const) {
         made.store.dispatch({ type: "wheel asked", by: "c4" });
         expect(at("asked").hidden, button).toBe(false);
         at(button).click();

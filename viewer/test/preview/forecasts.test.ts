@@ -67,11 +67,21 @@ describe("a forecast", () => {
     expect(withdrawn).toBe(1);
     made.store.dispatch({ type: "cleared" });
     expect(withdrawn).toBe(1);
+    for (const id of ["f1", "f2"]) forecasts.refused(id, "the client has withdrawn this forecast");
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(1);
+    // Also one that was overtaken, before the next is asked for.
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    ask(2);
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(2);
+    forecasts.refused("f3", "the client has withdrawn this forecast");
     ask(1);
     vi.advanceTimersByTime(1000);
     made.store.dispatch({ type: "order sent", id: "o", order: sent.at(-1)!, at: 0 });
     made.store.dispatch({ type: "cleared" });
-    expect(withdrawn).toBe(1);
+    expect(withdrawn).toBe(2);
   });
 
   it("that was overtaken before it was begun is an error of which nothing is said", () => {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
@@ -11,7 +12,7 @@ from . import _json
 from ._values import number, seconds, whole
 from ._waiting import Parts, in_thread, moment_after
 from ._watched import Watched
-from .errors import LinkError, NotDriverError, RejectedError, WaitError
+from .errors import LinkError, NotDriverError, RejectedError, TomboloError, WaitError
 from .orders import Command, Edits, Forecast, Given, Order, id_of
 
 if TYPE_CHECKING:
@@ -258,6 +259,7 @@ class Run(Watched):
         those of several threads and tasks take turns here.
         """
         begin, turn = clock.monotonic(), object()
+        question: Optional[str] = None
 
         def has_turn() -> bool:
             if self._forecasting is None:
@@ -265,13 +267,17 @@ class Run(Watched):
             return self._forecasting is turn
 
         def answer() -> Optional[tuple[str, Any]]:
-            return self._state.answers.get(question)
+            return None if question is None else self._state.answers.get(question)
 
         try:
             yield has_turn, timeout, "the turn of the forecast, behind others of this client, did not come"
             question = self._reader.client.forecast(prepared)
             kind, data = yield answer, left(begin, timeout), "no answer to the forecast came"
         finally:
+            if question is not None and answer() is None:
+                # Nobody waits for it any more. Where the run is gone, so is the forecast.
+                with contextlib.suppress(TomboloError):
+                    self._reader.client.withdraw_forecast()
             if self._forecasting is turn:
                 with self._reader.looking_again():
                     self._forecasting = None
