@@ -19,7 +19,8 @@ use crate::{
     changes::{Changes, make_absolute},
     meeting,
     steering::{
-        Asked, Forecaster, Log, OVERTAKEN, Queue, Received, Reservation, Source, WITHDRAWN, taken_back,
+        Asked, Forecaster, Log, OVERTAKEN, Queue, Received, Reservation, Source, WITHDRAWN,
+        taken_back,
     },
     step::Moment,
     stream::{CommandSink, Hub},

@@ -208,7 +208,7 @@ impl Jobs {
     /// Gives up the forecasts of an asker who has taken them back, or is gone, and says so.
     pub(crate) fn withdraw(&self, asker: u64) {
         // Told once the lock is free.
-        let withdrawn: Vec<Question> = self.change(|state| {
+        let withdrawn: VecDeque<Question> = self.change(|state| {
             self.give_forecast_up(state, GivenUp::Withdrawn, |underway| underway.asker == asker);
             let (withdrawn, others) =
                 state.forecasts.drain(..).partition(|waiting| waiting.asker == asker);

@@ -26,7 +26,7 @@ def test_what_a_feature_is_to_the_flow(begin):
 
 def test_facts(run):
     assert run.view_names == ["midplane"]
-    assert run.parameters == {"heating": (1, 0, 10)}
+    assert run.parameters == {"heating": (1, 0, 10, None)}
     run.wait_for_cycle(2, 30)
     run.wait_for(lambda: run.features, 30)
     assert "top" in {feature["name"] for feature in run.features}

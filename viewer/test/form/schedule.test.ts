@@ -25,7 +25,7 @@ describe("a schedule", () => {
     const summary = new ScheduleSummary();
     const picture = summary.root.querySelector("svg")!;
     summary.show({ steps: 2, every: { steps: 3 }, ease: "smooth" });
-    expect([summary.root.textContent!.trim(), picture.getAttribute("role"), picture.getAttribute("aria-label"), picture.hasAttribute("hidden")])
+    expect([summary.root.textContent.trim(), picture.getAttribute("role"), picture.getAttribute("aria-label"), picture.hasAttribute("hidden")])
       .toEqual(["2 shapes over 6 steps", "img", "The shape sets off and stops gently", false]);
     expect(picture.querySelector("polyline")!.getAttribute("points")).toBe("0.0,14.0 18.0,7.0 36.0,0.0");
     summary.show({ steps: 1, every: { steps: 1 } });
