@@ -577,10 +577,16 @@ mod tests {
         assert!(!jobs.cancellation.is_cancelled());
         jobs.withdraw(1);
         assert!(jobs.cancellation.is_cancelled());
-        // An order that comes then does not bring it back.
+        // Neither an order that comes then brings it back, nor one who comes again.
         jobs.plan(1, request());
+        lock(&jobs.state).at_forecast.as_mut().unwrap().begun = Instant::now().checked_sub(LONG);
+        ask(&jobs, &tell, 1, "of one who comes again");
         end(&jobs, question);
         assert!(matches!(jobs.next(), Some(Job::Plan(1, _))));
+        jobs.withdraw(1);
+        let withdrawn = ["of one who goes", "of one who comes again"];
+        let withdrawn = withdrawn.map(|asked| (asked, Some(WITHDRAWN)));
+        assert_eq!(told.try_iter().collect::<Vec<_>>(), withdrawn);
         // While another thread makes a plan, the forecast has not begun: that plan is not given up for it.
         ask(&jobs, &tell, 1, "of one who goes too");
         let Some(Job::Forecast(_)) = jobs.next() else { panic!("no forecast is next") };
