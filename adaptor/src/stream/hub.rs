@@ -157,8 +157,6 @@ pub(crate) struct Hub {
     arrivals: AtomicU64,
     /// The bits of the [`Audience`].
     audience: AtomicU64,
-    /// How many viewers are connected.
-    viewers: AtomicU64,
     /// The number of the run, where one is shown.
     run: Option<Arc<str>>,
 }
@@ -265,14 +263,8 @@ impl Hub {
         Audience::from_bits(self.audience.load(Ordering::Relaxed))
     }
 
-    /// How many viewers are connected.
-    pub(super) fn viewers(&self) -> u64 {
-        self.viewers.load(Ordering::Relaxed)
-    }
-
-    /// Notes which views somebody looks at, and how many are connected, where that may have changed.
+    /// Notes which views somebody looks at, where that may have changed.
     pub(super) fn note_audience(&self, state: &HubState) {
-        self.viewers.store(state.clients.len() as u64, Ordering::Relaxed);
         let of_each = state.audience().map(|client| client.audience());
         let audience = of_each.fold(Audience::NOBODY, Audience::with);
         self.audience.store(audience.to_bits(), Ordering::Relaxed);

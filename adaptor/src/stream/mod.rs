@@ -189,12 +189,6 @@ pub enum StreamError {
 /// How long the end of a run waits for viewers to read that it ended.
 const END_TIME: Duration = Duration::from_secs(1);
 
-/// With more viewers than these the stream's thread waits for [`GATHERED`] whenever it wakes up.
-const MANY: u64 = 8;
-/// How long the thread gathers what is said to many viewers, and what they say, before it goes on. It
-/// takes a core that may be the solver's each time it wakes up, and many viewers answer each frame.
-const GATHERED: Duration = Duration::from_millis(1);
-
 /// Threads for what would keep the others from being served.
 const BLOCKING_THREADS: usize = 2;
 
@@ -300,14 +294,8 @@ impl Server {
         });
         let ways = Ways { socket, acceptor, relay, links: Arc::clone(&links) };
         let (stop, stopped) = oneshot::channel();
-        let watched = Arc::clone(&hub);
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
-            .on_thread_unpark(move || {
-                if watched.viewers() > MANY {
-                    std::thread::sleep(GATHERED);
-                }
-            })
             // Answers that take long, of which there may be many asked for at once, and names that
             // are looked up: none of them waits for another.
             .max_blocking_threads(BLOCKING_THREADS)

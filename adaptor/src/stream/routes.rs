@@ -37,9 +37,6 @@ const WATCHED_SIZE: usize = 1 << 16;
 /// Bytes of a viewer that are read at once. They are cleared before each read, on a core that may be the
 /// solver's, and most messages are a few bytes.
 const READ_BUFFER: usize = 1 << 12;
-/// Bytes for a viewer that are gathered before they are sent. A frame among them makes way for no newer
-/// one.
-const WRITE_BUFFER: usize = 1 << 15;
 
 /// All routes, behind the gate.
 pub(super) fn router(shared: Shared) -> Router {
@@ -76,8 +73,7 @@ async fn upgrade(
         _ => WATCHED_SIZE,
     };
     let upgrade = upgrade.max_message_size(most).max_frame_size(most);
-    let upgrade = upgrade.read_buffer_size(READ_BUFFER).write_buffer_size(WRITE_BUFFER);
-    upgrade.on_upgrade(move |mut socket| async move {
+    upgrade.read_buffer_size(READ_BUFFER).on_upgrade(move |mut socket| async move {
         connection.upgraded();
         if let Some(shown) = &shared.playback {
             let shown = Arc::clone(shown);

@@ -110,8 +110,6 @@ impl Drop for Seat<'_> {
     }
 }
 
-/// Writes what there is for a viewer, and has it sent once there is nothing more: frames of several
-/// views go out together.
 async fn write(
     mut sink: SplitSink<WebSocket, Wire>,
     client: &Client,
@@ -127,11 +125,11 @@ async fn write(
                 topologies.retain(|&view, _| hub.has_view(view));
                 // Of later ones the viewer hears one by one.
                 let orders = is_first.then(|| commands.orders());
-                sink.feed(Wire::text(hub.hello(client.id, orders))).await
+                sink.send(Wire::text(hub.hello(client.id, orders))).await
             }
-            Ok(Some(Message::Text(text))) => sink.feed(Wire::Text(text.written())).await,
+            Ok(Some(Message::Text(text))) => sink.send(Wire::Text(text.written())).await,
             Ok(Some(Message::Stack(change))) => {
-                sink.feed(Wire::Text(change.text().written())).await
+                sink.send(Wire::Text(change.text().written())).await
             }
             Ok(Some(Message::Frame(view, frame))) => {
                 // One that goes on from another follows a frame of the same topology.
@@ -139,7 +137,7 @@ async fn write(
                 let is_known = topologies.insert(view, topology) == Some(topology);
                 let message = if is_known { frame.message.clone() } else { frame.with_topology() };
                 let bytes = message.len();
-                let written = sink.feed(Wire::Binary(message)).await;
+                let written = sink.send(Wire::Binary(message)).await;
                 if written.is_ok() {
                     hub.sent(bytes, &frame);
                 }
@@ -156,13 +154,12 @@ async fn write(
                 hub.want_key(view, level);
                 Ok(())
             }
-            Ok(None) => match sink.flush().await {
-                Ok(()) => tokio::select! {
+            Ok(None) => {
+                tokio::select! {
                     () = client.wake.notified() => Ok(()),
-                    _ = ping.tick() => sink.feed(Wire::Ping(Bytes::new())).await,
-                },
-                failed => failed,
-            },
+                    _ = ping.tick() => sink.send(Wire::Ping(Bytes::new())).await,
+                }
+            }
             Err((code, reason)) => {
                 let _ =
                     sink.send(Wire::Close(Some(CloseFrame { code, reason: reason.into() }))).await;
@@ -230,8 +227,8 @@ fn is_too_long(error: axum::Error) -> bool {
 }
 
 /// Takes one message: `{"id"?, "order" | "pause" | "resume" | "stop" | "parameter" | "pipelines" |
-/// "forecast" | "withdraw_forecast" | "drive" | "hand_over" | "keep" | "kick" | "here" | "link" | "name" | "follow" | "camera" |
-/// "note" | "remove_note" | "views": ...}`.
+/// "forecast" | "withdraw_forecast" | "drive" | "hand_over" | "keep" | "kick" | "here" | "link" |
+/// "name" | "follow" | "camera" | "note" | "remove_note" | "views": ...}`.
 fn receive(
     text: &str,
     seat: &Seat<'_>,
@@ -288,7 +285,7 @@ fn asked_for(message: &Said) -> &'static str {
         Said::Command(command) => command.name(),
         Said::Question(_) => "forecast",
         Said::Wheel(Wheel::HandOver { .. }) => "hand_over",
-        Said::Wheel(Wheel::Keep { .. }) => "keep",
+        Said::Wheel(Wheel::Keep {}) => "keep",
         Said::Wheel(Wheel::Kick { .. }) => "kick",
         Said::Wheel(Wheel::Drive {} | Wheel::Here {}) => "drive",
         Said::Together(_) => "what is free to all",
