@@ -238,13 +238,20 @@ fn a_stop_does_not_wait_for_shapes() {
 fn a_forecast_is_withdrawn() {
     let mut solver = solver();
     let mut viewer = driven(&mut solver);
-    for pause in [0, 300] {
-        viewer.send(&json!({"id": "long", "forecast": long(0.3)}));
-        std::thread::sleep(Duration::from_millis(pause));
+    let begun = Instant::now();
+    viewer.send(&json!({"id": "whole", "forecast": long(0.3)}));
+    viewer.wait_for("forecast", |told| told["id"] == "whole");
+    let whole = begun.elapsed();
+    for (pause, by) in [(0.0, 0.31), (0.1, 0.32)] {
+        let begun = Instant::now();
+        viewer.send(&json!({"id": "long", "forecast": long(by)}));
+        std::thread::sleep(whole.mul_f64(pause));
         viewer.send(&json!({"id": "w", "withdraw_forecast": {}}));
-        // Given up: were it only not told, it would still be there.
         let error = viewer.wait_for("error", |error| error["id"] == "long");
         assert!(error["message"].as_str().unwrap().contains("withdrawn"), "{error}");
+        // Found to its end and then not told it would take as long as the first.
+        let took = begun.elapsed();
+        assert!(took < whole.mul_f64(0.6), "{took:?} of {whole:?}");
         viewer.wait_for("done", |done| done["id"] == "w");
         viewer.send(&json!({"id": "short", "forecast": squeeze(0.1)}));
         let told = viewer.wait_for("forecast", |told| !told.is_null());

@@ -3,7 +3,10 @@
 
 mod common;
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use common::{LINK_TO_ALL, Viewer, config, squeeze};
 use serde_json::{Value, json};
@@ -23,8 +26,7 @@ fn long() -> Value {
     order
 }
 
-/// What a rank has done: its last cycle, the orders that moved its mesh, and on the first what the
-/// viewer found.
+/// A rank's last cycle, the orders that moved its mesh, and on rank 0 the viewer's findings.
 type Outcome<T> = (u64, Vec<String>, Option<T>);
 
 /// Steps on all ranks until the viewer stops them, which says something from a thread of its own.
@@ -104,13 +106,23 @@ fn an_order_is_cancelled_while_all_ranks_find_its_shapes() {
 #[test]
 fn a_forecast_is_withdrawn_while_all_ranks_find_it() {
     let outcomes = run(|viewer| {
-        for pause in [0, 300] {
-            viewer.send(&json!({"id": "long", "forecast": long()}));
-            std::thread::sleep(Duration::from_millis(pause));
+        let begun = Instant::now();
+        viewer.send(&json!({"id": "whole", "forecast": long()}));
+        viewer.wait_for("forecast", |told| told["id"] == "whole");
+        let whole = begun.elapsed();
+        for (pause, edits) in [(0.0, 0.31), (0.1, 0.32)] {
+            let pause = whole.mul_f64(pause);
+            let mut long = long();
+            long["edits"] = squeeze(edits)["edits"].clone();
+            let begun = Instant::now();
+            viewer.send(&json!({"id": "long", "forecast": long}));
+            std::thread::sleep(pause);
             viewer.send(&json!({"withdraw_forecast": {}}));
-            // Given up: were it only not told, it would be there once it is found.
             let error = viewer.wait_for("error", |error| error["id"] == "long");
             assert!(error["message"].as_str().unwrap().contains("withdrawn"), "{error}");
+            // Found to its end and then not told it would take as long as the first.
+            let took = begun.elapsed();
+            assert!(took < whole.mul_f64(0.6), "{took:?} of {whole:?}");
             viewer.send(&json!({"id": "short", "forecast": squeeze(0.1)}));
             let told = viewer.wait_for("forecast", |told| !told.is_null());
             let outcome = (&told["id"], &told["order"]["outcome"]);

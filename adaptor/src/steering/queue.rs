@@ -38,7 +38,7 @@ pub(crate) struct Asked {
     pub(crate) order: Box<Order>,
 }
 
-/// What viewers want to know.
+/// The forecasts that viewers have asked for.
 #[derive(Debug, Default)]
 struct Questions {
     waiting: Vec<Asked>,

@@ -22,7 +22,7 @@ pub(crate) struct PlanTogether {
     queue: Arc<Queue>,
 }
 
-/// What the ranks may be told to give up.
+/// Work of all ranks together that a viewer can take back.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum UnderWay {
     /// The plan of the order of this id.

@@ -21,21 +21,8 @@ __all__ = ["Event"]
 
 _KINDS = (
     *("hello", "status", "order", "parameters", "stack", "monitor", "forecast", "pipelines", "done", "people"),
-    *(
-        "camera",
-        "wheel",
-        "kept",
-        "followed",
-        "note",
-        "note_removed",
-        "link",
-        "play",
-        "precision",
-        "error",
-        "end",
-        "frame",
-    ),
-    *("lost", "ended"),
+    *("camera", "wheel", "kept", "followed", "note", "note_removed", "link", "play", "precision", "error", "end"),
+    *("frame", "lost", "ended"),
 )
 
 
