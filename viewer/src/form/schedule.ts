@@ -50,7 +50,7 @@ export class ScheduleSummary {
   private readonly sentence = element("span");
   private readonly picture = document.createElementNS(SVG, "svg");
   private readonly line = document.createElementNS(SVG, "polyline");
-  readonly root = element("summary", {}, this.sentence, " ", this.picture);
+  readonly root = element("summary", {}, this.sentence, this.picture);
 
   constructor() {
     this.picture.setAttribute("role", "img");
