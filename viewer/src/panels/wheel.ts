@@ -53,8 +53,6 @@ export class WheelPanel {
     clearTimeout(this.waiting);
     write(part("waiting"), text);
     part("waiting").hidden = text === "";
-    // Where the page is narrow it stands in a drawer, which may be closed.
-    if (text !== "") write(part("announcer"), text);
     if (text !== "") this.waiting = window.setTimeout(() => this.say(""), WAITING);
   }
 

@@ -80,6 +80,14 @@ describe("the wheel", () => {
       expect(at("waiting").hidden).toBe(true);
     });
 
+    it("is kept, or waited for, in words over the picture, which no drawer of a narrow page hides", () => {
+      at("wheel").click();
+      panel.kept({ by: "c4" });
+      const words = at("waiting");
+      expect([words.textContent, words.getAttribute("role")]).toEqual(["Viewer c4 keeps the wheel.", "status"]);
+      expect([words.closest("aside"), words.closest("#stage")]).toEqual([null, at("stage")]);
+    });
+
     it("is not told that somebody is there", () => {
       window.dispatchEvent(new Event("pointermove"));
       expect(made.sent).toEqual([]);
