@@ -27,6 +27,8 @@ export interface Questions {
 
 export class Forecasts {
   private asked: string | null = null;
+  /** The order that the last question was about. */
+  private question: Json | null = null;
   /** The names of questions that were overtaken and are not answered yet. */
   private readonly overtaken = new Set<string>();
   private resting: ReturnType<typeof setTimeout> | undefined;
@@ -52,13 +54,14 @@ export class Forecasts {
     this.store.dispatch({ type: "forecast asked" });
     this.resting = setTimeout(() => {
       this.asked = this.questions.ask(order);
+      this.question = order;
       if (this.asked === null) this.store.dispatch({ type: "forecast cleared" });
     }, REST);
   }
 
-  /** Whether the order was given just now: it takes the shapes that its forecast finds. */
+  /** Whether the order that was asked about was given just now: it takes the shapes that its forecast finds. */
   private isGiven(): boolean {
-    return this.store.state.orders.some(({ status }) => status === "sent");
+    return this.store.state.orders.some(({ status, order }) => status === "sent" && sameJson(order, this.question));
   }
 
   answer(answer: ForecastAnswer): void {

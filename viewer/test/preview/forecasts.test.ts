@@ -84,6 +84,23 @@ describe("a forecast", () => {
     expect(withdrawn).toBe(2);
   });
 
+  it("is given up where another order than its own was given", () => {
+    ask(1);
+    vi.advanceTimersByTime(1000);
+    made.store.dispatch({ type: "order sent", id: "o1", order: { undo: 1 }, at: 0 });
+    made.store.dispatch({ type: "cleared" });
+    expect(withdrawn).toBe(1);
+    forecasts.refused("f1", "the client has withdrawn this forecast");
+    // What was given before its own forecast was asked for: the one that is under way is of what was overtaken.
+    ask(2);
+    vi.advanceTimersByTime(1000);
+    ask(3);
+    const { edits, ...settings } = sent.at(-1)!;
+    made.store.dispatch({ type: "order sent", id: "o2", order: { edits: [{ translate: { features: ["throat"], fixed: [], by: [3, 0, 0] } }], ...settings }, at: 0 });
+    made.store.dispatch({ type: "cleared" });
+    expect([edits.length, withdrawn]).toEqual([1, 2]);
+  });
+
   it("that was overtaken before it was begun is an error of which nothing is said", () => {
     ask(1);
     vi.advanceTimersByTime(1000);
