@@ -5,93 +5,23 @@ mod common;
 
 use std::{
     io::{Read, Write},
-    net::{SocketAddr, TcpListener, TcpStream},
-    path::Path,
-    process::Output,
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
-    thread::JoinHandle,
+    net::TcpListener,
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
-use common::{LINK_TO_ALL, PATIENCE, Solver, config, program::tombolo, squeeze};
-use serde_json::Value;
+use common::{
+    LINK_TO_ALL, PATIENCE,
+    proxy::Proxy,
+    running::{MONITORED, Run, until},
+    squeeze,
+};
 use tokio_tungstenite::tungstenite;
 use tombolo::{
-    OrderStatus, Parameter, Report,
-    client::{Client, ClientError, Drives, Event, Link, Options, Received},
+    OrderStatus,
+    client::{Client, ClientError, Drives, Event, Link, Options},
     pipelines::language::{Order, parse_valid},
 };
-
-const MONITORED: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"},
-    "units": {"inflow": "m/s"}, "pipelines": [
-    {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
-    {"name": "health", "every": {"steps": 1}, "stages": [{"statistics": {"field": "speed"}}]}]}"#;
-
-/// A run that goes on by itself until it is asked to stop.
-struct Run {
-    link: Link,
-    address: SocketAddr,
-    over: Arc<AtomicBool>,
-    /// Milliseconds from step to step.
-    rest: Arc<AtomicU64>,
-    /// Those that the solver rests for now; 0 while it is in a call.
-    rests_for: Arc<AtomicU64>,
-    thread: Option<JoinHandle<Report>>,
-}
-
-impl Run {
-    fn new(text: &str) -> Self {
-        let parameter =
-            Parameter { name: "inflow".into(), value: 1.0, minimum: 0.0, maximum: 10.0 };
-        let settings = tombolo::Settings {
-            config: config(text),
-            parameters: vec![parameter],
-            ..Default::default()
-        };
-        let mut solver = Solver::new(settings);
-        let link = solver.adaptor.link().expect("a server").parse().expect("a link");
-        let address = solver.adaptor.address().expect("a server");
-        let over = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&over);
-        let rest = Arc::new(AtomicU64::new(2));
-        let resting = Arc::clone(&rest);
-        let rests_for = Arc::new(AtomicU64::new(0));
-        let resting_for = Arc::clone(&rests_for);
-        solver.step();
-        let run = move || {
-            while !solver.stopped && !is_over.load(Ordering::Relaxed) {
-                solver.step();
-                let begun = Instant::now();
-                // A rest may be made longer, or ended, while it is taken.
-                loop {
-                    let rest = resting.load(Ordering::Relaxed);
-                    resting_for.store(rest, Ordering::Relaxed);
-                    let left = Duration::from_millis(rest).saturating_sub(begun.elapsed());
-                    if left.is_zero() || is_over.load(Ordering::Relaxed) {
-                        break;
-                    }
-                    std::thread::sleep(left.min(Duration::from_millis(5)));
-                }
-                resting_for.store(0, Ordering::Relaxed);
-            }
-            solver.finish()
-        };
-        Self { link, address, over, rest, rests_for, thread: Some(std::thread::spawn(run)) }
-    }
-
-    fn end(mut self) -> Report {
-        self.over.store(true, Ordering::Relaxed);
-        self.thread.take().expect("a run").join().expect("no panic")
-    }
-
-    fn over(&self, port: u16) -> Link {
-        let own = format!(":{}/", self.address.port());
-        self.link.to_string().replace(&own, &format!(":{port}/")).parse().expect("a link")
-    }
-}
 
 fn quick() -> Options {
     Options { attempts: 1000, longest_pause: Duration::from_millis(250), ..Options::default() }
@@ -99,17 +29,6 @@ fn quick() -> Options {
 
 fn order(by: f64) -> Order {
     parse_valid(&squeeze(by).to_string(), "order").expect("an order")
-}
-
-/// Reads until an event fits.
-fn until<T>(client: &Client, what: &str, fits: impl Fn(&Received) -> Option<T>) -> T {
-    loop {
-        let told = client.next(PATIENCE).unwrap_or_else(|error| panic!("{what}: {error}"));
-        let told = told.unwrap_or_else(|| panic!("no {what}"));
-        if let Some(found) = fits(&told) {
-            return found;
-        }
-    }
 }
 
 fn applied(client: &Client, id: &str) {
@@ -121,56 +40,6 @@ fn applied(client: &Client, id: &str) {
         Event::Error(error) => panic!("{}", error.message),
         _ => None,
     });
-}
-
-/// Passes connections on to a run, and swallows what they carry or drops them when it is told to.
-struct Proxy {
-    port: u16,
-    open: Arc<Mutex<Vec<TcpStream>>>,
-    swallows: Arc<AtomicBool>,
-}
-
-/// Passes on what comes from one side, until either ends.
-fn pass(mut from: TcpStream, mut to: TcpStream, swallows: &AtomicBool) {
-    let mut bytes = vec![0; 1 << 16];
-    while let Ok(count @ 1..) = from.read(&mut bytes) {
-        if !swallows.load(Ordering::Relaxed) && to.write_all(&bytes[..count]).is_err() {
-            break;
-        }
-    }
-    let _ = to.shutdown(std::net::Shutdown::Both);
-}
-
-impl Proxy {
-    fn to(address: SocketAddr) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
-        let port = listener.local_addr().expect("an address").port();
-        let open = Arc::new(Mutex::new(Vec::new()));
-        let swallows = Arc::new(AtomicBool::new(false));
-        let (known, is_hole) = (Arc::clone(&open), Arc::clone(&swallows));
-        std::thread::spawn(move || {
-            for near in listener.incoming().flatten() {
-                let Ok(far) = TcpStream::connect(address) else { continue };
-                let copy = |stream: &TcpStream| stream.try_clone().expect("a copy");
-                known.lock().expect("no panic").extend([copy(&near), copy(&far)]);
-                for (from, to) in [(copy(&near), copy(&far)), (far, near)] {
-                    let is_hole = Arc::clone(&is_hole);
-                    std::thread::spawn(move || pass(from, to, &is_hole));
-                }
-            }
-        });
-        Self { port, open, swallows }
-    }
-
-    fn swallow(&self, swallows: bool) {
-        self.swallows.store(swallows, Ordering::Relaxed);
-    }
-
-    fn drop_all(&self) {
-        for stream in self.open.lock().expect("no panic").drain(..) {
-            let _ = stream.shutdown(std::net::Shutdown::Both);
-        }
-    }
 }
 
 #[test]
@@ -492,155 +361,4 @@ fn what_is_no_run_or_not_this_one_is_told_by_name() {
     run.end();
     let error = Client::connect(&link, &Options::default()).err();
     assert!(matches!(error, Some(ClientError::Refused { .. })), "{error:?}");
-}
-
-fn lines(output: &Output) -> Vec<Value> {
-    let text = String::from_utf8_lossy(&output.stdout);
-    text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
-}
-
-#[test]
-fn the_program_reaches_a_run() {
-    let run = Run::new(MONITORED);
-    let directory = tempfile::tempdir().expect("a directory");
-    let write = |name: &str, text: &str| {
-        std::fs::write(directory.path().join(name), text).expect("written");
-    };
-    write("link.txt", &format!("viewer: {}\n", run.link));
-    write("squeeze.json", &squeeze(0.3).to_string());
-    write("too-far.json", &squeeze(1.5).to_string());
-    write("nothing.json", "[]");
-    write("slip.json", r#"[{"translate": {"featurs": ["z-max"], "by": [0, 0, 1]}}]"#);
-    let call = |arguments: &[&str]| tombolo(directory.path(), arguments);
-    for (arguments, code, expected) in [
-        (&["status", "link.txt"][..], 0, "running: cycle"),
-        (&["doctor", "link.txt"], 0, "token: ok"),
-        (&["link", "link.txt"], 0, "/?key="),
-        (&["link", "link.txt", "--for", "drive", "--json"], 0, "{\"link\":{\"address\":\"http://"),
-        (&["link", "link.txt", "--for", "look"], 2, "watch"),
-        (&["forecast", "link.txt", "squeeze.json"], 0, "would be applied"),
-        (&["forecast", "link.txt", "too-far.json"], 1, "would be rejected"),
-        (&["order", "link.txt", "squeeze.json", "--wait"], 0, "applied"),
-        (&["order", "link.txt", "too-far.json", "--wait"], 1, "rejected"),
-        (&["order", "link.txt", "slip.json"], 1, "did you mean `features`?"),
-        (&["order", "link.txt", "nothing.json"], 2, "nothing.json: expected at least one edit"),
-        (&["undo", "link.txt", "--wait"], 0, "applied"),
-        (&["set", "link.txt", "inflow", "2"], 0, ""),
-        (&["set", "link.txt", "inflow", "NaN"], 2, "expected a number"),
-        (&["set", "link.txt", "inflaw", "2"], 1, "inflow"),
-        (&["pause", "link.txt"], 0, "paused"),
-        (&["resume", "link.txt"], 0, ""),
-        (&["cancel", "link.txt", "no-such-order"], 1, "no-such-order"),
-        (&["status"], 2, "LINK"),
-        (&["status", "nonsense"], 2, "expected http://HOST:PORT/?token=TOKEN"),
-        (&["doctor", "http://127.0.0.1:1/?token=a"], 2, "ssh -L 1:127.0.0.1:1 HOST"),
-    ] {
-        let (found, said, _) = call(arguments);
-        assert!(found == code && said.contains(expected), "{arguments:?}: {found}: {said}");
-    }
-    let (code, _, output) = call(&["status", "link.txt", "--json"]);
-    assert!(code == 0 && lines(&output)[0]["status"]["cycle"].is_u64());
-    let (code, _, output) = call(&["order", "link.txt", "squeeze.json", "--wait", "--json"]);
-    let told = lines(&output);
-    assert_eq!((code, &told.last().expect("a line")["order"]["status"]), (0, &"applied".into()));
-    let (code, _, output) =
-        call(&["doctor", &run.link.to_string().replace("token=", "token=x"), "--json"]);
-    let told = lines(&output);
-    assert_eq!((code, &told[4]["step"], &told[4]["ok"]), (2, &"token".into(), &false.into()));
-
-    let held = Client::connect(&run.link, &Options::default()).expect("connected");
-    held.drive(PATIENCE).expect("the wheel");
-    let (code, said, _) = call(&["pause", "link.txt"]);
-    assert!(code == 1 && said.contains("has the wheel"), "{said}");
-    drop(held);
-
-    let watching = std::thread::scope(|scope| {
-        let watching = scope.spawn(|| call(&["watch", "link.txt", "--json"]));
-        // Told to stop once the watching program is there.
-        let other = Client::connect(&run.link, &Options::default()).expect("connected");
-        other.wait_for_status(PATIENCE, |status| status.viewers >= 2).expect("a watcher");
-        run.over.store(true, Ordering::Relaxed);
-        watching.join().expect("no panic")
-    });
-    let told = lines(&watching.2);
-    assert_eq!((watching.0, &told.last().expect("a line")["end"]["how"]), (0, &"finished".into()));
-    assert_eq!(run.end().orders.len(), 4);
-}
-
-#[test]
-fn the_program_waits_until_a_command_has_taken_effect() {
-    let run = Run::new(LINK_TO_ALL);
-    let watches = Options { drives: Drives::Never, ..Options::default() };
-    let watching = Client::connect(&run.link, &watches).expect("connected");
-    run.rest.store(4000, Ordering::Relaxed);
-    let cycle = watching.wait_for_status(PATIENCE, |_| true).expect("a status").cycle;
-    let status = watching.wait_for_status(PATIENCE, |status| status.cycle > cycle + 1);
-    let cycle = status.expect("a step").cycle;
-    let (code, said, _) =
-        tombolo(Path::new("."), &["set", &run.link.to_string(), "inflow", "2", "--json"]);
-    let told: Value = serde_json::from_str(&said).expect("JSON");
-    let at = told["done"]["cycle"].as_u64();
-    assert!(code == 0 && at.is_some_and(|at| at > cycle), "{code}: {said}");
-    run.rest.store(2, Ordering::Relaxed);
-    drop(watching);
-    run.end();
-}
-
-#[test]
-fn the_program_lists_what_waits_and_replaces_it() {
-    let run = Run::new(LINK_TO_ALL);
-    let directory = tempfile::tempdir().expect("a directory");
-    for (name, by) in [("second.json", 0.2), ("better.json", 0.05)] {
-        std::fs::write(directory.path().join(name), squeeze(by).to_string()).expect("written");
-    }
-    let link = run.link.to_string();
-    let call = |task: &str, arguments: &[&str]| {
-        let (code, said, output) =
-            tombolo(directory.path(), &[&[task, link.as_str()], arguments, &["--json"]].concat());
-        (code, said, lines(&output))
-    };
-    let given = |task: &str, arguments: &[&str]| {
-        let (code, said, told) = call(task, arguments);
-        assert_eq!(code, 0, "{task} {arguments:?}: {said}");
-        told[0]["order"]["id"].as_str().expect("a name").to_owned()
-    };
-    let watches = Options { drives: Drives::Never, ..Options::default() };
-    let watching = Client::connect(&run.link, &watches).expect("connected");
-    // All of it comes while the solver computes one step.
-    let rest = 900_000;
-    run.rest.store(rest, Ordering::Relaxed);
-    while run.rests_for.load(Ordering::Relaxed) != rest {
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    let second = given("order", &["second.json"]);
-    let (code, said, _) = tombolo(directory.path(), &["queue", link.as_str()]);
-    let expected = format!("order {second}: waits for the solver's next call, since cycle");
-    assert!(code == 0 && said.contains(&expected), "{said}");
-    // The program waits for the next call, which comes once the order is there.
-    let better = std::thread::scope(|scope| {
-        let better = scope.spawn(|| given("replace", &[&second, "better.json"]));
-        until(&watching, "the better order", |told| match &told.event {
-            Event::Order(order) if order.id != second => Some(()),
-            _ => None,
-        });
-        run.rest.store(2, Ordering::Relaxed);
-        better.join().expect("no panic")
-    });
-    let begun = Instant::now();
-    while tombolo(directory.path(), &["queue", link.as_str()]).1 != "no order waits\n" {
-        assert!(begun.elapsed() < PATIENCE, "it never moves the mesh");
-    }
-    for (order, reason) in [
-        (second.as_str(), "no longer waits"),
-        (better.as_str(), "no longer waits"),
-        ("nobody", "there is no order 'nobody'"),
-    ] {
-        let (code, said, _) = call("replace", &[order, "second.json"]);
-        assert!(code == 1 && said.contains(reason), "{order}: {code}: {said}");
-    }
-    let orders = run.end().orders;
-    let of = |id: &str| orders.iter().find(|order| order.id == id).expect("it was taken");
-    let reason = of(&second).reason.as_deref().unwrap_or_default();
-    assert!(reason.contains(&format!("replaced by order {better}")), "{reason}");
-    assert_eq!(of(&better).status, OrderStatus::Applied);
 }

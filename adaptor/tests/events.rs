@@ -5,6 +5,7 @@ mod common;
 use std::{
     collections::BTreeMap,
     fmt::Debug,
+    path::Path,
     sync::{Mutex, Once, PoisonError},
 };
 
@@ -254,4 +255,55 @@ fn a_server_on_every_address_and_a_secret_that_others_can_read_are_warned_of() {
         assert!(has("every address of this machine"), "{open:?}");
         assert_eq!(has("chmod 600"), mode == 0o644, "{open:?}");
     }
+}
+
+/// A run that keeps a journal in a folder.
+fn with_journal(folder: &Path) -> Settings {
+    let config = config(r#"{"version": 1, "journal": "journal.jsonl"}"#);
+    Settings { config, output: folder.into(), ..Settings::default() }
+}
+
+/// A run that goes on from a checkpoint beside a journal that does not have it may have lost what was
+/// accepted since.
+#[test]
+fn a_journal_of_other_runs_is_warned_of_where_a_run_goes_on() {
+    listen();
+    let [own, other] = [(); 2].map(|()| tempfile::tempdir().expect("a directory"));
+    let mut solver = Solver::new(with_journal(own.path()));
+    solver.steps(3);
+    let run = solver.adaptor.run_id().to_owned();
+    let (mesh, saved) = (solver.mesh.clone(), solver.adaptor.checkpoint());
+    solver.finish();
+    let mut solver = Solver::new(with_journal(other.path()));
+    solver.steps(2);
+    solver.finish();
+    for (folder, is_other) in [(&own, false), (&other, true)] {
+        let mut solver = Solver::new(with_journal(folder.path()).restart(saved.clone()));
+        (solver.mesh, solver.cycle) = (mesh.clone(), 3);
+        solver.step();
+        solver.finish();
+        let warned = told(&run, "level", "WARN");
+        let has = |told: &Told| told.get("message").contains("does not tell of the checkpoint");
+        assert_eq!(warned.iter().any(has), is_other, "{warned:?}");
+    }
+}
+
+/// A solver that steps faster than its pictures can be written is not held up, and whoever will need
+/// them hears once that some are missing.
+#[test]
+fn a_recording_without_all_frames_is_warned_of_once() {
+    listen();
+    let folder = tempfile::tempdir().expect("a directory");
+    let text = r#"{"version": 1, "record": "run.tombolo", "pipelines": [
+        {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]}]}"#;
+    let settings =
+        Settings { config: config(text), output: folder.path().into(), ..Settings::default() };
+    let mut solver = Solver::of_box([20, 20, 20], settings);
+    let run = solver.adaptor.run_id().to_owned();
+    solver.steps(200);
+    let missing = solver.finish().stream.unrecorded;
+    let warned = told(&run, "level", "WARN");
+    assert!(missing > 0);
+    let has = |told: &&Told| told.get("message").contains("has not all frames");
+    assert_eq!(warned.iter().filter(has).count(), 1, "{warned:?}");
 }

@@ -4,6 +4,8 @@
 mod common;
 
 use std::{
+    io::{BufRead, BufReader},
+    process::{Command, Stdio},
     sync::{
         Arc,
         atomic::{AtomicU64, Ordering},
@@ -264,6 +266,30 @@ fn a_forecast_is_withdrawn() {
     viewer.send(&json!({"withdraw_forecast": {}}));
     solver.step_until_told(&mut viewer, "order", has_status("given", "applying"));
     solver.finish();
+}
+
+/// Whoever waits for a forecast in a terminal is told why it takes long.
+#[test]
+fn a_forecast_that_takes_long_is_explained() {
+    let mut solver = solver();
+    solver.step();
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("long.json");
+    std::fs::write(&file, long(0.3).to_string()).expect("written");
+    let mut asking = Command::new(env!("CARGO_BIN_EXE_tombolo"))
+        .args(["forecast", &solver.adaptor.link().expect("a server")])
+        .arg(&file)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("runs");
+    let said = BufReader::new(asking.stderr.take().expect("its errors")).lines().next();
+    let said = said.expect("a line").expect("text");
+    assert!(said.contains("not found yet; the shapes of orders come before forecasts"), "{said}");
+    asking.kill().expect("it waits still");
+    asking.wait().expect("it has ended");
+    let begun = Instant::now();
+    solver.finish();
+    assert!(begun.elapsed() < Duration::from_secs(10), "{:?}", begun.elapsed());
 }
 
 #[test]

@@ -251,13 +251,14 @@ fn runs_and_views_are_exported_to_files_of_their_own() {
     assert!(said.contains("wall_two: drawn without colours"), "{said}");
     // A view that there is not leaves no files, and the error says which there are.
     let wrong = std::process::Command::new(env!("CARGO_BIN_EXE_tombolo"))
-        .args(["export", "run.tombolo", "--out", "wrong", "--view", "wal"])
+        .args(["export", "run.tombolo", "--out", "wrong", "--view", "wall_tow"])
         .current_dir(output.path())
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&wrong.stderr);
     assert_eq!(wrong.status.code(), Some(1), "{said}");
-    assert!(said.contains("there is no view `wal`") && said.contains("it has `"), "{said}");
+    assert!(said.contains("there is no view `wall_tow`") && said.contains("it has `"), "{said}");
+    assert!(said.contains("did you mean `wall"), "{said}");
     assert_eq!(std::fs::read_dir(output.path().join("wrong")).unwrap().count(), 0);
     let out = output.path().join("out");
     let count = |ending: &str| {

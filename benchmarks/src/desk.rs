@@ -5,6 +5,7 @@
 
 use std::{
     error::Error,
+    fs,
     process::{self, Command},
 };
 
@@ -41,6 +42,28 @@ impl Desk {
         let arguments = ["--all-tasks", "--pid", "--cpu-list", &others.join(","), &own];
         peer::run(Command::new("taskset").args(arguments))?;
         Ok(Self { core: Some(last) })
+    }
+
+    /// Lets threads of this process whose names begin so run on the core of the desk as well: a run that
+    /// has a core free beside those of its solver.
+    ///
+    /// # Errors
+    /// Where the threads cannot be listed, or the program `taskset` fails.
+    pub fn let_in(&self, names: &str) -> Result<(), Box<dyn Error>> {
+        if self.core.is_none() {
+            return Ok(());
+        }
+        for thread in fs::read_dir("/proc/self/task")? {
+            let thread = thread?;
+            if !fs::read_to_string(thread.path().join("comm"))?.starts_with(names) {
+                continue;
+            }
+            let id = thread.file_name();
+            let mut all = Command::new("taskset");
+            all.args(["--pid", "--cpu-list", "0-4095"]).arg(id);
+            peer::run(&mut all)?;
+        }
+        Ok(())
     }
 
     /// A program on the core of the desk; where there is none, with the lowest priority.

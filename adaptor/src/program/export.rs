@@ -10,7 +10,10 @@ use std::{
 };
 
 use crate::{
-    deform::mesh::{CellType, Cells},
+    deform::{
+        mesh::{CellType, Cells},
+        names,
+    },
     pipelines::{
         encode::{DecodedCells, DecodedFrame, Decoder},
         extract::Extract,
@@ -172,12 +175,13 @@ pub(crate) fn export(options: &Options) -> Result<(), Failure> {
 
 /// The error where no frame is of the view that is asked for; `others` are the views that there are.
 fn unknown(name: &str, others: &BTreeSet<String>) -> Failure {
+    let near = names::hint(name, others.iter().map(String::as_str));
     let others: Vec<_> = others.iter().map(|other| format!("`{other}`")).collect();
     let known = match others.as_slice() {
         [] => "it has none".to_owned(),
         others => format!("it has {}", others.join(", ")),
     };
-    Failure::Wrong(format!("there is no view `{name}` in the recording: {known}"))
+    Failure::Wrong(format!("there is no view `{name}` in the recording: {known}{near}"))
 }
 
 fn unwritten(path: &Path, error: &std::io::Error) -> Failure {

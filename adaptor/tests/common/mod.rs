@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 
 pub mod program;
+pub mod proxy;
 pub mod running;
 
 use std::time::{Duration, Instant};

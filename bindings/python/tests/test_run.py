@@ -105,6 +105,25 @@ def test_an_order_is_given_forecast_and_taken_back(solver, run):
     assert np.array_equal(solver.points, solver.reference)
 
 
+def test_a_forecast_that_nobody_waits_for_any_longer_is_given_up(begin):
+    def long(height):
+        edit = {"translate": {"features": ["top"], "fixed": ["bottom"], "by": [0, 0, height]}}
+        return {"edits": [edit], "schedule": {"steps": 10_000}}
+
+    with tombolo.connect(begin(count=12).link) as run:
+        run.wait_for(lambda: run.features, 30)
+        run.drive()
+        begun = time.monotonic()
+        assert run.forecast(long(0.1), timeout=120).outcome == "applied"
+        whole = time.monotonic() - begun
+        begun = time.monotonic()
+        with pytest.raises(TimeoutError):
+            run.forecast(long(0.2), timeout=0.2 * whole)
+        # Found to its end it would keep the next one waiting.
+        assert run.forecast(SQUEEZE, timeout=60).outcome == "applied"
+        assert time.monotonic() - begun < 0.7 * whole
+
+
 def test_an_order_takes_the_place_of_one_that_waits(solver, run):
     run.wait_for(lambda: run.features, 30)
     # Both come while the solver computes one step.

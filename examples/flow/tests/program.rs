@@ -538,6 +538,12 @@ fn the_state_at_the_end_is_saved_too() {
     let again = Options { steps: Some(1), restart: Some(state.clone()), ..headless(&case) };
     let report = run(&again);
     assert_eq!((report.cycles, report.error.as_deref()), (7, None));
+    let mut flow = std::process::Command::new(env!("CARGO_BIN_EXE_flow"));
+    flow.arg("--case").arg(&case).args(["--headless", "--steps", "1", "--restart"]).arg(&state);
+    let output = flow.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("the state is at cycle 7: 1 steps leave nothing to do"), "{said}");
     // Among the coordinates.
     let mut damaged = std::fs::read(&state).unwrap();
     damaged[1000] ^= 4;
