@@ -66,8 +66,8 @@ export class Scene {
   private readonly ranges = new Ranges();
   private readonly pending = new Map<string, DataFrame>();
   private readonly early = new EarlyFrames();
-  private readonly ghost: Ghost;
-  /** These two are made when they are first shown. */
+  /** These three are made when they are first shown. */
+  private ghost: Ghost | null = null;
   private bones: BonesPicture | null = null;
   private chosen: ChosenFaces | null = null;
   private features: string[] = [];
@@ -106,7 +106,6 @@ export class Scene {
     });
     new ResizeObserver(() => this.resize()).observe(container);
     selection.onChange(() => this.request());
-    this.ghost = new Ghost(this.renderer);
     watchContext(this.canvas.getCanvas()!, (isLost) => this.lose(isLost));
     this.resize();
   }
@@ -134,13 +133,14 @@ export class Scene {
 
   /** The surface that previews are shapes of. */
   setPreviewSurface(surface: PreviewSurface): void {
+    this.ghost ??= new Ghost(this.renderer);
     this.ghost.setSurface(surface);
     this.request();
   }
 
   /** Shows the shape that an edit would make, with its broken triangles; null takes it away. `drawn` is called once it is seen. */
   setPreview(points: Float32Array | null, broken?: Uint32Array, drawn?: () => void): void {
-    this.ghost.setPoints(points, broken);
+    this.ghost?.setPoints(points, broken);
     if (points) {
       this.pace.move();
       this.detail.move();
@@ -176,7 +176,8 @@ export class Scene {
 
   /** The box around the preview that is drawn; null when there is none. */
   get previewBounds(): [Vector, Vector] | null {
-    return this.ghost.coordinates && bounds(this.ghost.coordinates);
+    const points = this.ghost?.coordinates;
+    return points ? bounds(points) : null;
   }
 
   /** The views that there are and how they look; those that are gone are removed. While `held`, automatic ranges stay as they are. */
@@ -420,14 +421,14 @@ export class Scene {
     });
   }
 
-  /** A number made of all pixels (FNV-1a). They are there only in the task that has drawn them. */
+  /** A number made of all pixels, each of four bytes (FNV-1a). They are there only in the task that has drawn them. */
   private pixels(): number {
     const [width, height] = this.canvas.getSize();
     const context = this.canvas.get3DContext({}) as WebGL2RenderingContext;
-    const bytes = new Uint8Array(4 * width * height);
-    context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, bytes);
+    const pixels = new Uint32Array(width * height);
+    context.readPixels(0, 0, width, height, context.RGBA, context.UNSIGNED_BYTE, new Uint8Array(pixels.buffer));
     let hash = 0x811c9dc5;
-    for (const byte of bytes) hash = Math.imul(hash ^ byte, 0x01000193);
+    for (let i = 0; i < pixels.length; i++) hash = Math.imul(hash ^ pixels[i]!, 0x01000193);
     return hash >>> 0;
   }
 
