@@ -1,6 +1,6 @@
 /** Puts a compressed copy beside every file of the viewer that becomes smaller by it: `name.br` and `name.gz`. */
 import { readFileSync, readdirSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 import type { Plugin } from "vite";
 
@@ -14,7 +14,7 @@ export function compress(): Plugin {
   return {
     name: "compress",
     apply: "build",
-    configResolved: (config) => { directory = join(config.root, config.build.outDir); },
+    configResolved: (config) => { directory = resolve(config.root, config.build.outDir); },
     closeBundle: {
       order: "post",
       handler: () => {
