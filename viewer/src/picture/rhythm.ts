@@ -4,7 +4,9 @@
  */
 
 /** The longest pause between two pictures of new values, in milliseconds. */
-const LONGEST_REST = 500;
+export const LONGEST_REST = 500;
+/** How long new values wait for a hand that shapes, in milliseconds from one of its shapes: longer than the next takes. */
+export const SHAPING = 150;
 
 /** Time and the browser's chances to draw, so that a test can stand in for them. */
 export interface Clock { now(): number; frame(action: () => void): void; later(action: () => void, milliseconds: number): void }
@@ -18,6 +20,8 @@ export class Rhythm {
   private isWaiting = false;
   /** The time before which new values do not come into a picture. */
   private rested = 0;
+  /** When new values came into a picture last. */
+  private taken = -Infinity;
   /** When the picture was begun into which new values came; null where none did. */
   private begun: number | null = null;
   /** Who waits for the next picture, and whether somebody wants all in it that has come. */
@@ -61,6 +65,11 @@ export class Rhythm {
     }, rest);
   }
 
+  /** A hand has made a shape, and may make another: new values wait a moment for it. */
+  shaped(): void {
+    this.rested = Math.max(this.rested, Math.min(this.clock.now() + SHAPING, this.taken + LONGEST_REST));
+  }
+
   /**
    * Whether new values come into the picture that is about to be drawn; where they do, what it costs says when the next ones may. What
    * cannot be drawn without them does not wait.
@@ -71,7 +80,7 @@ export class Rhythm {
       this.requestGently();
       return false;
     }
-    this.begun = now;
+    this.begun = this.taken = now;
     return true;
   }
 
@@ -84,7 +93,7 @@ export class Rhythm {
     // What a picture costs is known once the browser takes up its next task.
     if (begun !== null) this.clock.later(() => {
       const now = this.clock.now();
-      this.rested = now + Math.min(LONGEST_REST, now - begun);
+      this.rested = Math.max(this.rested, now + Math.min(LONGEST_REST, now - begun));
     }, 0);
   }
 }

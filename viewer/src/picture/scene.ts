@@ -144,6 +144,7 @@ export class Scene {
     if (points) {
       this.pace.move();
       this.detail.move();
+      this.rhythm.shaped();
     }
     this.request(drawn);
   }

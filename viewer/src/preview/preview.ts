@@ -42,8 +42,11 @@ export interface PreviewEvents {
 /** Milliseconds without a new wish after which a shape is looked at. */
 const REST = 120;
 
-/** While the hand goes on, shapes are looked at no more often than so many milliseconds, and for no more than this part of the time. */
-const LOOK = { apart: 250, part: 0.1 };
+/**
+ * While the hand goes on, shapes are looked at no more often than so many milliseconds, and for no more than this part of the time: the shape
+ * that is wished for meanwhile waits.
+ */
+const LOOK = { apart: 250, part: 0.04 };
 
 interface Wish { stack: Json[]; wished: Json[]; at: number }
 

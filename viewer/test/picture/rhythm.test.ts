@@ -1,5 +1,5 @@
 import { beforeEach, expect, test } from "vitest";
-import { Rhythm } from "../../src/picture/rhythm";
+import { LONGEST_REST, Rhythm, SHAPING } from "../../src/picture/rhythm";
 
 let now: number, frames: (() => void)[], timers: { at: number; action: () => void }[];
 let isAnimating: boolean, pending: number, cost: number, taken: number[], pictures: number;
@@ -73,4 +73,24 @@ test("an interaction draws by itself, and what is waited for is told once it has
   expect([pictures, told]).toEqual([0, 0]);
   draw();
   expect(told).toBe(1);
+});
+
+test("new values wait for a hand that shapes, half a second at most, and come soon after it rests", () => {
+  for (let shape = 0; shape < 100; shape++) {
+    arrive();
+    rhythm.shaped();
+    rhythm.request();
+    pass(20);
+  }
+  const apart = taken.slice(1).map((at, i) => at - taken[i]!);
+  expect(apart.length).toBeGreaterThanOrEqual(2);
+  for (const gap of apart) {
+    expect(gap).toBeGreaterThanOrEqual(LONGEST_REST);
+    expect(gap).toBeLessThanOrEqual(LONGEST_REST + 50);
+  }
+  const { length } = taken, rested = now;
+  arrive();
+  pass(SHAPING + 50);
+  expect(taken.length).toBeGreaterThan(length);
+  expect(taken[length]! - rested).toBeLessThanOrEqual(SHAPING + 20);
 });
