@@ -238,6 +238,7 @@ const steps = [
     await page.getByLabel("schedule steps", { exact: true }).fill(scheduleSteps);
     await page.getByLabel("schedule every", { exact: true }).first().fill(scheduleEvery);
     await until("the preview of the order", (now) => now.preview.state === "shown");
+    await viewer.filmed("half-as-high", "right");
     await page.click("#apply");
     check((await look()).preview.state === "none", "the preview is still there after Apply");
     const phases = new Set();
@@ -263,6 +264,7 @@ const steps = [
     });
     console.log(`    throat: ${shared.extent} to ${await extent()}; on the screen ${shared.pixels} to ${pixels} pixels`);
     await viewer.holds("the pinch in the list of edits", () => document.querySelectorAll("#stack li").length === 1);
+    await viewer.filmed("half-as-high-applied", "right");
     await picture("pinched-side");
     await page.click('[data-camera="reset"]');
     await drawn();

@@ -40,6 +40,9 @@ export const launch = () => chromium.launch({
     "--disable-background-networking", "--disable-component-update", "--disable-sync"],
 });
 
+/** The sizes of page that a task is filmed at; the last is that of a page that is opened. */
+const SIZES = [[1920, 1080], [820, 1180], [1280, 800]];
+
 /** A viewer in a browser of its own, as another person has one. */
 export class Viewer {
   /** `options` are those of a browser context, such as its viewport. */
@@ -114,6 +117,20 @@ export class Viewer {
       const { violations } = await window.axe.run(document, { resultTypes: ["violations"] });
       return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).slice(0, 5).join(", ")}`);
     });
+  }
+
+  /** Keeps what the page looks like at three sizes, with a drawer open where the page is narrow; nobody is kept out of it. */
+  async filmed(name, drawer = null) {
+    for (const [width, height] of SIZES) {
+      await this.page.setViewportSize({ width, height });
+      const isNarrow = width <= 1100;
+      if (isNarrow && drawer) await this.page.click(`#${drawer}-drawer`);
+      await this.drawn();
+      await this.picture(`${name}-${width}`);
+      if (isNarrow && drawer) await this.page.click(`#${drawer}-drawer`);
+    }
+    const found = await this.violations();
+    check(found.length === 0, `${name}: ${found.join("; ")}`);
   }
 
   /** A number of the edit that is in the form. */

@@ -1,6 +1,6 @@
 /**
  * Looks at a running nozzle as a person would, in Debian's Chromium: on a narrow page and a wide one, in light and dark; moves the
- * camera, a slice and the range of the colours, reads and pins a place, and reloads.
+ * camera, a slice and the range of the colours, reads and pins a place, reloads, and turns a picture of very many triangles.
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/seeing.mjs
  *
@@ -15,6 +15,29 @@ let wire = 0;
 const network = await page.context().newCDPSession(page);
 await network.send("Network.enable");
 network.on("Network.loadingFinished", ({ encodedDataLength }) => { wire += encodedDataLength; });
+
+/** How many triangles each picture was drawn with, the newest last. */
+await page.addInitScript(() => {
+  window.pictures = [];
+  let triangles = null;
+  const count = (mode, corners) => {
+    if (mode !== WebGL2RenderingContext.TRIANGLES) return;
+    if (triangles === null) queueMicrotask(() => {
+      window.pictures = [...window.pictures.slice(-50), triangles];
+      triangles = null;
+    });
+    triangles += corners / 3;
+  };
+  const { drawArrays, drawElements } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.drawArrays = function (mode, first, corners) {
+    count(mode, corners);
+    return drawArrays.call(this, mode, first, corners);
+  };
+  WebGL2RenderingContext.prototype.drawElements = function (mode, corners, type, offset) {
+    count(mode, corners);
+    return drawElements.call(this, mode, corners, type, offset);
+  };
+});
 
 const until = (what, condition, argument) => viewer.holds(what, condition, argument);
 const drawn = () => viewer.drawn();
@@ -136,6 +159,31 @@ const steps = [
     await page.click("#keys-button");
     check(await page.isVisible("#keys"), "the sheet of keys does not open");
     await page.keyboard.press("Escape");
+  }],
+  ["very many triangles are drawn coarsely while the picture is turned, and in full once it rests", async () => {
+    await page.setViewportSize({ width: 1280, height: 800 });
+    await page.click("#pipeline-add");
+    await page.click('[data-template="slice"]');
+    await page.waitForSelector("#pipeline-text .cm-content");
+    const planes = Array.from({ length: 32 }, (_, i) => ({ origin: [0, 0, -0.045 + (0.09 * i) / 31], normal: [0, 0, 1] }));
+    const stages = [{ slice: { planes } }, { select: { fields: ["velocity"] } }, { stream: { error: { relative: 1e-3 } } }];
+    await page.click("#pipeline-text .cm-content");
+    await page.keyboard.press("Control+a");
+    await page.keyboard.insertText(JSON.stringify({ name: "many", every: { steps: 5 }, stages }));
+    await until("no errors", () => /No errors/.test(document.getElementById("pipeline-state").textContent));
+    await page.keyboard.press("Control+Enter");
+    const triangles = await until("very many triangles", () => window.tombolo.views.many?.cycle !== null && window.tombolo.views.many?.triangles > 100_000 && window.tombolo.views.many.triangles);
+    await drawn();
+    // Their clusters are found on the way, beside the picture.
+    await until("a coarse picture", (all) => {
+      document.getElementById("scene").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }));
+      return window.pictures.at(-1) < all / 2;
+    }, triangles);
+    await until("a picture in full", (all) => window.pictures.at(-1) >= all, triangles);
+    await picture("very-many");
+    await page.click("#pipeline-close");
+    for (const button of ["icon", "small"]) await page.click(`#pipelines li[data-pipeline="many"] .${button}[data-act="remove"]`);
+    await until("the view gone", () => !("many" in window.tombolo.views));
   }],
   ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
 ];
