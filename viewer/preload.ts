@@ -1,9 +1,8 @@
 /**
- * Has `index.html` name what the page needs at once beside the small script that begins, so that the browser fetches all of it together: the
- * page's own script (`main`), which the small one imports, and the geometry kernel, which it compiles. A page that has loaded has run both
- * scripts.
+ * Has `index.html` name the page's own script (`main`) too, behind the small one that begins and imports it: the browser fetches both at
+ * once, and a page that has loaded has run both.
  */
-import type { HtmlTagDescriptor, Plugin } from "vite";
+import type { Plugin } from "vite";
 
 export function preload(): Plugin {
   return {
@@ -11,13 +10,8 @@ export function preload(): Plugin {
     apply: "build",
     transformIndexHtml: {
       order: "post",
-      handler: (_, { bundle }) => Object.values(bundle ?? {}).flatMap((file): HtmlTagDescriptor[] => {
-        const address = `./${file.fileName}`;
-        if (file.type === "chunk") return file.name === "main" ? [{ tag: "script", attrs: { type: "module", crossorigin: true, src: address }, injectTo: "head" }] : [];
-        // The policy before it is asked whether it may be fetched.
-        return /\bkernel-[^/]*\.wasm$/.test(file.fileName)
-          ? [{ tag: "link", attrs: { rel: "preload", as: "fetch", type: "application/wasm", crossorigin: true, href: address }, injectTo: "head" }] : [];
-      }),
+      handler: (_, { bundle }) => Object.values(bundle ?? {}).flatMap((file) =>
+        file.type === "chunk" && file.name === "main" ? [{ tag: "script", attrs: { type: "module", crossorigin: true, src: `./${file.fileName}` }, injectTo: "head" as const }] : []),
     },
   };
 }
