@@ -336,9 +336,16 @@ impl Client {
         self.tell(|outbox| outbox.parameters = Some(text.clone()));
     }
 
-    /// Puts a status in the place of the last one.
-    pub(super) fn status(&self, text: &Text) {
-        self.tell(|outbox| outbox.status = Some(text.clone()));
+    /// Puts a status, if there is a new one, in the place of the last one. It is sent with what comes
+    /// next: alone only where nothing has come until this is called again.
+    pub(super) fn status(&self, text: Option<&Text>) {
+        let mut outbox = lock(&self.outbox);
+        if outbox.status.is_some() {
+            self.wake.notify_one();
+        }
+        if let Some(text) = text.filter(|_| !outbox.has_ended) {
+            outbox.status = Some(text.clone());
+        }
     }
 
     /// Puts a camera in the place of the last one.

@@ -32,6 +32,9 @@ use crate::lock::lock;
 
 /// Bytes of a message that are read of a viewer that does not drive: it may choose many views.
 pub(crate) const UNDRIVEN: usize = 1 << 14;
+/// Bytes of texts that wait for what is sent with them: a message of its own for each of many viewers
+/// costs the machine more than what it carries.
+const GATHERED: usize = 1 << 12;
 /// How long a message beyond the allowance is held back before it is looked at again.
 const HELD_BACK: Duration = Duration::from_millis(100);
 
@@ -119,6 +122,7 @@ async fn write(
     // By view, the topology that was sent last.
     let mut topologies: HashMap<usize, u64> = HashMap::new();
     let mut ping = tokio::time::interval(PING_PERIOD);
+    let mut gathered = 0;
     loop {
         let written = match client.next() {
             Ok(Some(Message::Hello { is_first })) => {
@@ -127,7 +131,16 @@ async fn write(
                 let orders = is_first.then(|| commands.orders());
                 sink.send(Wire::text(hub.hello(client.id, orders))).await
             }
-            Ok(Some(Message::Text(text))) => sink.send(Wire::Text(text.written())).await,
+            Ok(Some(Message::Text(text))) => {
+                let text = text.written();
+                gathered += text.len();
+                if gathered <= GATHERED {
+                    sink.feed(Wire::Text(text)).await
+                } else {
+                    gathered = 0;
+                    sink.send(Wire::Text(text)).await
+                }
+            }
             Ok(Some(Message::Stack(change))) => {
                 sink.send(Wire::Text(change.text().written())).await
             }
@@ -153,6 +166,10 @@ async fn write(
             Ok(Some(Message::Behind(view, level))) => {
                 hub.want_key(view, level);
                 Ok(())
+            }
+            Ok(None) if gathered > 0 => {
+                gathered = 0;
+                sink.flush().await
             }
             Ok(None) => {
                 tokio::select! {

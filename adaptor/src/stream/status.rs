@@ -20,12 +20,17 @@ impl Hub {
     /// was told for ten seconds. Called a few times a second.
     pub(crate) fn status(&self) {
         // The solver could wait for the lock: what is told is copied under it, and written later.
-        let Some((is_news, status)) = self.new_status() else { return };
-        let text = Text::of(move || json!({ "status": status() }));
+        let (is_news, text) = match self.new_status() {
+            Some((is_news, status)) => {
+                (is_news, Some(Text::of(move || json!({ "status": status() }))))
+            }
+            None => (false, None),
+        };
         let state = lock(&self.state);
-        state.clients.values().for_each(|client| client.status(&text));
+        state.clients.values().for_each(|client| client.status(text.as_ref()));
         // A recording of a run that rests does not grow.
-        state.observer.iter().filter(|_| is_news).for_each(|observer| observer.status(&text));
+        let observer = state.observer.iter().filter(|_| is_news);
+        observer.for_each(|observer| observer.status(text.as_ref()));
     }
 
     /// The status, where it is to be told, and whether anything in it has changed.
