@@ -109,6 +109,8 @@ export interface OrderStatus {
   not_followed?: { cycle: number; shape: number; distance: number } | null;
   deviation?: number | null;
   largest_displacement?: number | null;
+  /** The part of its amounts that is done, or of a rejected order the part that would have passed. */
+  fraction?: number | null;
   seconds?: { surface?: number; volume?: number; guard?: number } | null;
   added_steps?: number | null;
 }
