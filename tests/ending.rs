@@ -31,6 +31,9 @@ fn ends(small: &Small, signal: &str, prepare: impl FnOnce(&mut Run) -> Option<Vi
     assert!(small.bytes("out/final.vtu").len() > 1000);
     let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
     assert!(journal.lines().any(|line| line.contains("\"stop\"")), "{journal}");
+    // Nothing comes behind the line that says so, and it is whole.
+    let last = journal.lines().last().expect("a line");
+    assert!(last.starts_with("{\"end\":") && journal.ends_with('\n'), "{journal}");
     serde_json::from_slice(&small.bytes("report.json")).expect("a report")
 }
 
@@ -43,6 +46,27 @@ fn a_signal_ends_a_run_with_all_that_it_leaves_behind() {
         Some(viewer)
     });
     assert!(report["cycles"].as_u64().is_some_and(|cycles| cycles > 3), "{report}");
+}
+
+/// The shapes of an order are given up, and the run does not wait for them.
+#[test]
+fn a_signal_ends_a_run_whose_order_is_being_planned() {
+    let small = endless(|_| ());
+    let report = ends(&small, "TERM", |run| {
+        let mut viewer = Viewer::connect(&run.link()).expect("the run lets in");
+        viewer.wait_for("hello", |hello| hello["role"] == "driver");
+        // So many edits and shapes take longer than it takes to send the signal.
+        let edit = json!({"translate": {
+            "features": ["throat"], "fixed": ["inlet", "outlet"], "by": [0, 0, 1e-6]}});
+        let order = json!({"edits": vec![edit; 4000], "schedule": {"steps": 10_000}});
+        viewer.send(&json!({"id": "long", "order": order}));
+        viewer.wait_for("order", |order| order["id"] == "long" && order["status"] == "computing");
+        Some(viewer)
+    });
+    let order = &report["orders"][0];
+    assert_eq!((&order["id"], &order["status"]), (&json!("long"), &json!("rejected")), "{report}");
+    assert!(order["reason"].as_str().is_some_and(|reason| reason.contains("given up")), "{report}");
+    assert_eq!(report["mesh"]["inverted"], 0, "{report}");
 }
 
 #[test]

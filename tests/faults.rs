@@ -247,6 +247,31 @@ fn a_wrong_token_lets_nobody_in() {
     assert!(small.bytes("out/last.vtu") == undisturbed());
 }
 
+/// Batch systems hand secrets on in the environment.
+#[test]
+fn secrets_of_the_environment_let_in_and_are_not_printed() {
+    let (driving, watching) = ("DrivingSecretOfTheTest1", "WatchingSecretOfTheTest2");
+    let small = paused();
+    let mut run = Run::start(
+        program("flow")
+            .args(small.arguments(&["--pipelines", "@pipelines.json", "--steps", "20"]))
+            .env("TOMBOLO_DRIVING_SECRET", driving)
+            .env("TOMBOLO_WATCHING_SECRET", watching),
+    );
+    let link = run.link();
+    assert_eq!(link.token, driving);
+    // The one that watches is the first to come, and does not drive.
+    let mut watcher = Viewer::connect(&link.with_token(watching)).expect("the run lets in");
+    let hello = watcher.wait_for("hello", |_| true);
+    assert_eq!((&hello["role"], &hello["may_drive"]), (&json!("watcher"), &json!(false)));
+    let mut driver = Viewer::connect(&link.with_token(driving)).expect("the run lets in");
+    driver.wait_for("hello", |hello| hello["role"] == "driver" && hello["may_drive"] == true);
+    let text = finish(run, driver);
+    for secret in [driving, watching] {
+        assert!(!text.contains(secret), "{text}");
+    }
+}
+
 #[test]
 fn a_viewer_that_dies_in_mid_frame_costs_nothing() {
     let small = paused();

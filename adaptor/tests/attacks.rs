@@ -12,7 +12,11 @@ use std::{
 use common::{LINK_TO_ALL, Solver, Viewer, socket_url, squeeze};
 use serde_json::json;
 use tokio_tungstenite::tungstenite::Message;
-use tombolo::{Adaptor, deform::shapes::box_of_tets, pipelines::encode::Decoder};
+use tombolo::{
+    Adaptor,
+    deform::shapes::box_of_tets,
+    pipelines::{encode::Decoder, limits::VALUES},
+};
 
 /// How soon one with a right secret gets in, on however busy a machine.
 const SOON: Duration = Duration::from_secs(5);
@@ -467,6 +471,7 @@ fn a_new_connection_is_no_way_around_the_limit_of_messages() {
 fn bytes_of_all_kinds_are_refused() {
     let mut solver = Solver::with_config(LINK_TO_ALL);
     solver.step();
+    let in_peace = median_step(&mut solver);
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     for (open, close) in [("[", "]"), ("{\"a\":", "}"), ("{\"order\":[", "]}")] {
@@ -475,6 +480,15 @@ fn bytes_of_all_kinds_are_refused() {
         let told = solver.step_until_told(&mut viewer, "error", |_| true);
         assert!(told["message"].as_str().unwrap().len() < 2000, "{told}");
     }
+    // More values than there may be, in fewer bytes than there may be. They are counted while the
+    // solver steps.
+    let wide =
+        format!(r#"{{"id": "wide", "order": {{"stack": [{}1]}}}}"#, "1,".repeat(VALUES.most));
+    viewer.send_text(&wide);
+    let flooded = median_step(&mut solver);
+    let told = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "wide");
+    let beyond = VALUES.check(VALUES.most + 1).expect_err("too many").to_string();
+    assert!(told["message"].as_str().unwrap().ends_with(&beyond), "{told}");
     let mut random = fastrand::Rng::with_seed(1);
     for length in [1, 3, 16, 300, 5000, 200_000] {
         let mut noise = vec![0; length];
@@ -489,6 +503,11 @@ fn bytes_of_all_kinds_are_refused() {
     assert_eq!(head(&raw(&solver.adaptor, body.as_bytes())).0, "405");
     drop(viewer);
     all_is_well(&mut solver);
+    let behind = median_step(&mut solver);
+    println!("a step takes {flooded:?}, then {behind:?}, in peace {in_peace:?}");
+    for taken in [flooded, behind] {
+        assert!(taken < 10 * in_peace + Duration::from_millis(5), "{taken:?}, not {in_peace:?}");
+    }
 }
 
 /// A slow link is at most two frames late, and a reader is not cut off as long as it reads.

@@ -4,7 +4,7 @@
 
 mod common;
 
-use std::{io::Read, net::TcpListener, path::Path, time::Duration};
+use std::{io::Read, net::TcpListener, os::unix::fs::PermissionsExt, path::Path, time::Duration};
 
 use common::{Solver, config, program::tombolo, running::Running, squeeze};
 use serde_json::{Value, json};
@@ -83,6 +83,43 @@ fn the_output_of_a_run_is_enough_to_steer_it() {
     let reason =
         "this client only watches: the secret or link that this viewer came with is for watching";
     assert!(code == 1 && said.contains(reason), "{code}: {said}");
+}
+
+/// What a run prints others may read: its secrets are in a file that only its owner can read, and what
+/// is printed to a terminal opens one browser, once.
+#[test]
+fn an_invitation_holds_no_secret() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let config = config(r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}}"#);
+    let output = directory.path().to_owned();
+    let mut solver = Solver::new(Settings { config, output, ..Settings::default() });
+    let links = [solver.adaptor.link(), solver.adaptor.watching_link()];
+    let secrets = links.map(|link| {
+        let link = link.expect("a server");
+        link.split_once("token=").expect("a secret").1.to_owned()
+    });
+    let mut invite =
+        |terminal| solver.adaptor.invitation(terminal).expect("written").expect("a server");
+    let (to_log, to_terminal, once_more) = (invite(false), invite(true), invite(true));
+    for invitation in [&to_log, &to_terminal, &once_more] {
+        assert!(!invitation.contains("token="), "{invitation}");
+        for secret in &secrets {
+            assert!(!invitation.contains(secret), "{invitation}");
+        }
+    }
+    assert!(!to_log.contains("key="), "{to_log}");
+    let key = |invitation: &str| {
+        assert_eq!(invitation.matches("key=").count(), 1, "{invitation}");
+        let (_, rest) = invitation.split_once("?key=").expect("a link with a key");
+        rest.lines().next().expect("a key").to_owned()
+    };
+    assert_ne!(key(&to_terminal), key(&once_more), "a key is given out once");
+    // The secrets are in the file, which is its owner's alone, also once it was written again.
+    let file = told(&to_log);
+    let text = std::fs::read_to_string(file).expect("the links");
+    assert!(secrets.iter().all(|secret| text.contains(secret)), "a secret is missing");
+    let mode = std::fs::metadata(file).expect("the file").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
 }
 
 /// With port 0 the file of each run has another name.

@@ -82,6 +82,14 @@ fn what_others_can_reach_is_encrypted_unless_it_is_expressly_not() {
     assert!(open.starts_with("https://") && open.contains("#sha256="), "{open}");
     let insecure = link(json!({"listen": "0.0.0.0:0", "insecure": true})).expect("started");
     assert!(insecure.starts_with("http://"), "{insecure}");
+    // Nobody can connect to every address: the links name the machine, where the system tells its name.
+    if let Ok(name) = std::fs::read_to_string("/proc/sys/kernel/hostname") {
+        for link in [&open, &insecure] {
+            let (_, rest) = link.split_once("://").expect("a scheme");
+            let (host, _) = rest.split_once(':').expect("a port");
+            assert!(host == name.trim() && host != "0.0.0.0", "{link}");
+        }
+    }
     let loopback = link(json!({"listen": "127.0.0.1:0"})).expect("started");
     assert!(loopback.starts_with("http://"), "{loopback}");
     let both = json!({"listen": "127.0.0.1:0", "insecure": true, "tls": {}});

@@ -12,7 +12,7 @@ use std::{
 use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
-    Settings,
+    Adaptor, Settings,
     logging::{self, LevelFilter, LoggingError},
     pipelines::language::parse_orders,
 };
@@ -84,6 +84,22 @@ fn told(run: &str, field: &str, value: &str) -> Vec<Told> {
     kept.iter().filter(fits).cloned().collect()
 }
 
+/// The secrets of a run, for driving and for watching.
+fn secrets(adaptor: &Adaptor) -> [String; 2] {
+    [adaptor.link(), adaptor.watching_link()].map(|link| {
+        let link = link.expect("a server");
+        link.split_once("token=").expect("a secret").1.to_owned()
+    })
+}
+
+/// Checks that no field of any event so far has this text in it.
+fn assert_untold(text: &str) {
+    let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let tells = |told: &&Told| told.0.values().any(|value| value.contains(text));
+    let telling = kept.iter().find(tells);
+    assert!(telling.is_none(), "{telling:?}");
+}
+
 fn statuses(told: &[Told]) -> Vec<&str> {
     told.iter().map(|told| told.get("status")).collect()
 }
@@ -153,6 +169,7 @@ fn viewers_commands_and_checkpoints_are_told_with_their_run() {
     settings.output = directory.path().into();
     let mut solver = Solver::new(settings);
     let run = solver.adaptor.run_id().to_owned();
+    let secrets = secrets(&solver.adaptor);
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     solver.step();
@@ -185,6 +202,7 @@ fn viewers_commands_and_checkpoints_are_told_with_their_run() {
     assert_eq!(seen.len(), 2, "{seen:?}");
     assert!(seen[0].get("message").contains("has come"), "{seen:?}");
     assert!(seen[1].get("message").contains("has left"), "{seen:?}");
+    secrets.iter().for_each(|secret| assert_untold(secret));
 }
 
 /// What was refused is told once, with who and what: a flood, a long message, a command of one who watches.
@@ -234,6 +252,47 @@ fn what_is_refused_is_told_once_with_who_and_what() {
         let _ = std::io::Read::read_to_end(&mut ended, &mut end);
     }
     told("too many connections at once have shown no secret");
+    secrets(&solver.adaptor).iter().for_each(|secret| assert_untold(secret));
+}
+
+/// What such a request shows may be nearly right, or right: it is not told.
+#[test]
+fn a_wrong_secret_and_a_foreign_page_are_told_once_each() {
+    listen();
+    let solver = Solver::with_config(LINK_TO_ALL);
+    let run = solver.adaptor.run_id().to_owned();
+    let secrets = secrets(&solver.adaptor);
+    let address = solver.adaptor.address().expect("a server");
+    let ask = |secret: &str, headers: &str| {
+        let mut stream = std::net::TcpStream::connect(address).expect("connected");
+        let request = format!(
+            "GET /pipelines?token={secret} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n"
+        );
+        std::io::Write::write_all(&mut stream, request.as_bytes()).expect("sent");
+        let mut answer = String::new();
+        std::io::Read::read_to_string(&mut stream, &mut answer).expect("an answer");
+        answer
+    };
+    for wrong in ["wrong-secret-1", "wrong-secret-2", &secrets[0][1..]] {
+        let answer = ask(wrong, "");
+        assert!(answer.starts_with("HTTP/1.1 401"), "{answer}");
+    }
+    for secret in &secrets {
+        let answer = ask(secret, "Origin: http://evil.example\r\n");
+        assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
+    }
+    for reason in [
+        "it showed no secret that is known here",
+        "it came under a foreign name or from a page of another site",
+    ] {
+        let told = told(&run, "reason", reason);
+        assert_eq!(told.len(), 1, "{reason}: {told:?}");
+        let told = &told[0];
+        assert_eq!((told.get("address"), told.get("level")), ("127.0.0.1", "WARN"), "{told:?}");
+        assert!(told.get("message").contains("a request from 127.0.0.1 was refused"), "{told:?}");
+    }
+    assert_untold("wrong-secret");
+    secrets.iter().for_each(|secret| assert_untold(&secret[1..]));
 }
 
 /// A server that others reach, and a secret that others can read, are warned of.

@@ -148,11 +148,13 @@ fn an_order_that_is_added_to_the_file_repeats_none_of_those_before() {
     assert_eq!(again.finish().orders.len(), expected.len());
 }
 
-fn random_message(random: &mut Rng, sent: u64) -> Value {
+/// Messages that a viewer sends at once: one, or a pause and what ends it, without which the run would
+/// wait for ever.
+fn random_messages(random: &mut Rng, sent: u64) -> Vec<Value> {
     let amount = 0.05 + 0.01 * random.u64(..25) as f64;
     let schedule = json!({"steps": 1 + random.u64(..5), "every": {"steps": 1 + random.u64(..4)}});
     let id = format!("m{sent}");
-    match random.u64(..10) {
+    let message = match random.u64(..13) {
         0 => json!({"id": id, "order": {"undo": 1 + random.u64(..2), "schedule": schedule}}),
         1 => json!({"id": id, "order": {"stack": squeeze(amount)["edits"], "schedule": schedule}}),
         2 => json!({"id": id, "cancel": {"order": format!("m{}", random.u64(..sent + 1))}}),
@@ -161,8 +163,18 @@ fn random_message(random: &mut Rng, sent: u64) -> Value {
         4 => json!({"id": id, "parameter": {"name": "heating", "value": amount}}),
         5 => json!({"id": id, "pipelines": {"set": [{"name": "shape", "on": "order",
                     "stages": [{"schedule": schedule}]}]}}),
+        6 => {
+            let resume = json!({"id": format!("{id}-ends"), "resume": {}});
+            return vec![json!({"id": id, "pause": {}}), resume];
+        }
+        // In place of one of the last, which may wait still.
+        7 => json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule,
+                    "replaces": format!("m{}", sent.saturating_sub(1 + random.u64(..3)))}}),
+        8 => json!({"id": id, "order": {"edits": [{"translate": {"features": ["nowhere"],
+                    "by": [0, 0, amount]}}], "schedule": schedule}}),
         _ => json!({"id": id, "order": {"edits": squeeze(amount)["edits"], "schedule": schedule}}),
-    }
+    };
+    vec![message]
 }
 
 /// Waits until a run that was let go of has let go of its journal: a thread of its own does.
@@ -185,7 +197,7 @@ fn last_cycle(journal: &str) -> usize {
     usize::try_from(whole.lines().filter_map(cycle).max().unwrap_or(0)).unwrap()
 }
 
-/// A run that is killed and goes on, again and again.
+/// A run that is killed, or ends as it should, and goes on, again and again.
 struct Killed {
     random: Rng,
     output: tempfile::TempDir,
@@ -196,7 +208,7 @@ struct Killed {
     sent: u64,
     /// Orders of which a viewer was told that they are accepted.
     acknowledged: Vec<String>,
-    /// The journal when the last run was killed and everybody had been told that.
+    /// The journal when the last run was killed, or had ended, and everybody had been told that.
     #[cfg(target_os = "linux")]
     on_disk: Option<power::OnDisk>,
     /// The state that the next run goes on from, and its cycle.
@@ -266,15 +278,25 @@ impl Killed {
             let journal = self.journal();
             let begun = journal.rfind("{\"run\":").unwrap_or(0);
             let whole = journal[begun..].rsplit_once('\n').map_or("", |(whole, _)| whole);
-            if let Some(line) = whole.lines().find(|line| line.starts_with("{\"checkpoint\":")) {
+            // The same run may have made one before.
+            let is_next =
+                |line: &&str| line.starts_with("{\"checkpoint\":") && **line != *self.line;
+            if let Some(line) = whole.lines().rfind(is_next) {
                 return line.to_owned();
             }
             std::thread::sleep(Duration::from_millis(1));
         }
     }
 
-    /// Runs with a viewer that asks for this and that, and is killed; says how many cycles it has
-    /// done again. It saves its state at this cycle, if at any.
+    /// Saves the state of a run, and takes note of the line of the journal about it.
+    fn save(&mut self, solver: &mut Solver) -> (Vec<u8>, Mesh, u64) {
+        let bytes = solver.adaptor.checkpoint().to_bytes();
+        self.line = self.next_checkpoint();
+        (bytes, solver.mesh.clone(), solver.cycle)
+    }
+
+    /// Runs with a viewer that asks for this and that; says how many cycles it has done again. It saves
+    /// its state at this cycle, if at any, and is killed, or saves its state and ends as it should.
     fn run(&mut self, cycles: u64, saved: Option<u64>) -> usize {
         let known = self.known();
         let mut solver = self.start();
@@ -284,19 +306,22 @@ impl Killed {
         let mut state = None;
         for cycle in 0..cycles {
             if self.random.u64(..4) == 0 {
-                viewer.send(&random_message(&mut self.random, self.sent));
+                let messages = random_messages(&mut self.random, self.sent);
+                messages.iter().for_each(|message| viewer.send(message));
                 self.sent += 1;
                 if self.random.u64(..2) == 0 {
                     viewer.look_for("order", Duration::from_millis(5), |_| false);
                 }
             }
             if Some(cycle) == saved {
-                let bytes = solver.adaptor.checkpoint().to_bytes();
-                state = Some((bytes, solver.mesh.clone(), solver.cycle));
-                self.line = self.next_checkpoint();
+                state = Some(self.save(&mut solver));
             }
             step(&mut solver, &mut done);
             std::thread::sleep(Duration::from_micros(self.random.u64(..3000)));
+        }
+        let ends_well = self.random.u64(..3) == 0;
+        if ends_well {
+            state = Some(self.save(&mut solver));
         }
         while viewer.look_for("nothing", Duration::from_millis(1), |_| true).is_some() {}
         let accepted = |message: &Value| {
@@ -306,11 +331,17 @@ impl Killed {
         self.acknowledged.extend(viewer.seen.iter().filter_map(accepted));
         self.acknowledged.sort();
         self.acknowledged.dedup();
+        let killed = if ends_well {
+            solver.finish();
+            None
+        } else {
+            Some(solver)
+        };
         #[cfg(target_os = "linux")]
         {
             self.on_disk = Some(power::OnDisk::of(&self.file()));
         }
-        drop((solver, viewer));
+        drop((killed, viewer));
         wait_for_lock(&self.file());
         let again = self.take_over(done, known);
         if let Some(state) = state {

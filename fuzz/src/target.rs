@@ -182,14 +182,15 @@ impl Target {
 
 /// Messages of viewers.
 fn messages(seeds: &Seeds) -> impl Iterator<Item = Vec<u8>> {
-    let order = json!({"edits": [{"scale": {"features": ["a"], "fixed": [], "by": [1, 1, 2]}}],
+    let order = json!({"edits": [{"scale_direction": {"features": ["a"], "fixed": [],
+                                                      "factors": [1, 1, 2]}}],
                        "deform": {"method": "elasticity"}, "schedule": {"steps": 4}});
     let others = [
         json!({"id": "a", "order": order}),
         json!({"id": "b", "forecast": order}),
         json!({"withdraw_forecast": {}}),
         json!({"keep": {}}),
-        json!({"cancel": {"id": "a"}}),
+        json!({"cancel": {"order": "a"}}),
         json!({"parameter": {"name": "heating", "value": 2.0}}),
         json!({"pause": {}}),
         json!({"resume": {}}),
