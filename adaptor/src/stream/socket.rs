@@ -132,6 +132,11 @@ const SEND_BUFFER: usize = 64 << 10;
 #[cfg(target_os = "linux")]
 const UNSENT: u32 = 16 << 10;
 
+/// How long what was sent may go without the network of the client acknowledging any of it. A ping is
+/// sent every [`super::PING_PERIOD`], so that one whose network is gone does not keep its place.
+#[cfg(target_os = "linux")]
+const UNACKNOWLEDGED: std::time::Duration = std::time::Duration::from_secs(30);
+
 impl Listening {
     pub(super) async fn accept(&self) -> io::Result<Accepted> {
         match self {
@@ -160,11 +165,30 @@ impl Listening {
 }
 
 /// Small messages (an order's outcome) do not wait for more bytes, and little lies in the system's
-/// buffers. A socket that cannot be set so works too.
+/// buffers; a network that is gone is noticed. A socket that cannot be set so works too.
 pub(super) fn hold_little(stream: &TcpStream) {
     let _ = stream.set_nodelay(true);
     let settings = socket2::SockRef::from(stream);
     let _ = settings.set_send_buffer_size(SEND_BUFFER);
     #[cfg(target_os = "linux")]
-    let _ = settings.set_tcp_notsent_lowat(UNSENT);
+    {
+        let _ = settings.set_tcp_notsent_lowat(UNSENT);
+        let _ = settings.set_tcp_user_timeout(Some(UNACKNOWLEDGED));
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_network_that_is_gone_ends_a_connection_in_time() {
+        let socket = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = socket.local_addr().expect("an address");
+        let _client = TcpStream::connect(address).await.expect("connected");
+        let (stream, _) = socket.accept().await.expect("accepted");
+        hold_little(&stream);
+        let time = socket2::SockRef::from(&stream).tcp_user_timeout().expect("told");
+        assert_eq!(time, Some(UNACKNOWLEDGED));
+    }
 }
