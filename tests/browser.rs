@@ -1,6 +1,7 @@
 //! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
-//! shaping by hand, a first day, pipelines changed, a shape changed by two people, several people together,
-//! runs behind a relay and a proxy, the viewer in a page of others, and the end of a run.
+//! shaping by hand, a first day, pipelines changed, a shape changed by two people over an encrypted line,
+//! several people together, runs behind a relay and a proxy, the viewer in a page of others, the end of a
+//! run, and a recording.
 
 use std::path::Path;
 use std::process::Command;
@@ -113,8 +114,10 @@ fn small(stream: &Value, options: &[&str]) -> (Small, Run) {
 #[test]
 fn two_people_change_a_shape() {
     let _alone = alone();
-    let (_small, mut run) = small(&json!({}), &[]);
-    drive("shape.mjs", &mut run);
+    // Encrypted by the run, with a certificate that it makes.
+    let (_small, mut run) = small(&json!({"tls": {}}), &[]);
+    let url = run.line("its link", driving);
+    drive_at("shape.mjs", &url, &run, &[]);
 }
 
 #[test]
@@ -122,6 +125,42 @@ fn the_end_of_a_run_in_a_browser() {
     let _alone = alone();
     let (_small, mut run) = small(&json!({}), &["--steps", "1500"]);
     drive("ended.mjs", &mut run);
+}
+
+#[test]
+fn a_recording_in_a_browser() {
+    let _alone = alone();
+    let small = Small::new();
+    small.write(
+        "pipelines.json",
+        &json!({"version": 1, "record": "run.tombolo", "pipelines": [
+            {"name": "surface", "every": {"steps": 30}, "stages": [{"surface": {}}, {"stream": {}}]}
+        ]}),
+    );
+    let pinch = json!({"edits": [{"scale_direction": {
+        "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, 0.8]}}]});
+    small.write("orders.json", &json!([{"at": {"cycle": 1500}, "order": pinch}]));
+    let options = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"];
+    let run = Run::flow(&small.arguments(&[&options[..], &["--steps", "3000"]].concat()));
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let mut played = Run::start(
+        program("tombolo")
+            .arg("play")
+            .arg(small.path("out/run.tombolo"))
+            .args(["--listen", "127.0.0.1:0"])
+            // Where it writes its links.
+            .env("TMPDIR", small.path("out")),
+    );
+    let url = played.line("its link", |line| {
+        let (_, path) = line.split_once("the links to this recording are in ")?;
+        let text = std::fs::read_to_string(path).ok()?;
+        text.lines().find_map(|line| line.strip_prefix("watch: ")).map(str::to_owned)
+    });
+    drive_at("recording.mjs", &url, &played, &[]);
+    played.signal("TERM");
+    let (status, text) = played.finish(PATIENCE);
+    assert!(status.success(), "{text}");
 }
 
 #[test]

@@ -1,15 +1,19 @@
 /**
- * Changes the shape of a running nozzle as two people would, in Debian's Chromium: what is safe at first, a refused order and each of
- * its remedies, an earlier edit changed, taking back by keys, the wheel handed over, and the end of the run.
+ * Changes the shape of a running nozzle as two people would, in Debian's Chromium, over a line that the run itself encrypts: whom the
+ * browser talks to, what is safe at first, a refused order and each of its remedies, an earlier edit changed, taking back by keys, the
+ * wheel handed over, and the end of the run.
  *
- *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... TOMBOLO_PID=... node tests/browser/shape.mjs
+ *     TOMBOLO_URL="https://127.0.0.1:7070/?token=...#sha256=..." TOMBOLO_PID=... node tests/browser/shape.mjs
  *
  * TOMBOLO_PID is the run's process, which is asked to stop at last; without it the run goes on. The other variables are those of page.mjs.
  */
+import { createHash } from "node:crypto";
 import { Failure, Viewer, check, launch, link, run } from "./page.mjs";
 
 const browser = await launch();
-const first = await Viewer.open(browser, "first");
+// The certificate is one that nobody has signed.
+const options = { ignoreHTTPSErrors: true };
+const first = await Viewer.open(browser, "first", options);
 let second = null;
 const { page } = first;
 const factor = (axis, value) => first.field(`factors ${axis}`).fill(String(value));
@@ -29,8 +33,23 @@ const inSight = (viewer, selector) => viewer.page.evaluate((wanted) => {
 }, selector);
 
 const steps = [
+  ["the line is encrypted, by the certificate that the link names", async () => {
+    const [socket] = await Promise.all([page.waitForEvent("websocket"), page.goto(link)]);
+    check(socket.url().startsWith("wss://"), `the connection is to ${socket.url().split("?")[0]}`);
+    const context = page.context();
+    const debugging = await context.newCDPSession(page);
+    let line = null;
+    debugging.on("Security.visibleSecurityStateChanged", ({ visibleSecurityState }) => { line = visibleSecurityState.certificateSecurityState ?? line; });
+    await debugging.send("Security.enable");
+    await first.until("what the browser says of the line", () => line !== null);
+    check(line.protocol === "TLS 1.3", `the page came by ${line.protocol}`);
+    const fingerprint = createHash("sha256").update(line.certificate[0], "base64").digest("hex");
+    check(link.endsWith(`#sha256=${fingerprint}`), `the browser sees the certificate ${fingerprint}`);
+    const cookies = await context.cookies();
+    check(cookies.length > 0 && cookies.every(({ secure, httpOnly }) => secure && httpOnly), "a cookie could go over a line that is not encrypted");
+    check(!page.url().includes("token"), `the secret stays in ${page.url()}`);
+  }],
   ["what flows in and out is held at first", async () => {
-    await page.goto(link);
     const { selection, role } = await first.until("a first picture", (now) => now.connection === "connected" && now.frames > 0 && now.selection.fixed.length > 0);
     check(role === "driver", `the first viewer should steer, it is ${role}`);
     check(JSON.stringify(selection) === JSON.stringify({ handle: [], fixed: ["inlet", "outlet"] }), `at first ${JSON.stringify(selection)} is chosen`);
@@ -155,7 +174,7 @@ const steps = [
     check((await first.settled(known)).status === "applied", "Ctrl+Enter did not apply");
   }],
   ["the wheel is asked for, kept, and handed over", async () => {
-    second = await Viewer.open(browser, "second", { viewport: { width: 1920, height: 1080 } });
+    second = await Viewer.open(browser, "second", { viewport: { width: 1920, height: 1080 }, ...options });
     await second.page.goto(link);
     const seen = await second.until("a picture", (now) => now.connection === "connected" && now.frames > 0);
     check(seen.role === "watcher", `the second viewer is ${seen.role}`);

@@ -1,0 +1,95 @@
+/**
+ * Watches a recording that `tombolo play` shows, in Debian's Chromium: it goes on by itself to its end, the slider is dragged back and
+ * forth, and nothing can be ordered.
+ *
+ *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/recording.mjs
+ *
+ * The recording is that of a nozzle whose throat an order pinches to eight tenths about half way. The variables are those of page.mjs.
+ */
+import { Viewer, check, launch, link, run } from "./page.mjs";
+
+const browser = await launch();
+const viewer = await Viewer.open(browser, "recording");
+const { page } = viewer;
+const button = (text) => viewer.holds(`the button "${text}"`, (wanted) => document.getElementById("play").textContent === wanted, text);
+/** Where the slider stands, from 0 at its beginning to 1 at its end. */
+const stand = () => page.evaluate(() => {
+  const { min, max, value } = document.getElementById("moment");
+  return (Number(value) - Number(min)) / (Number(max) - Number(min));
+});
+/** Drags the slider from one place to another, from 0 at its left end to 1 at its right one. */
+const drag = async (from, to) => {
+  const box = await page.locator("#moment").boundingBox();
+  const x = (part) => box.x + part * box.width;
+  const y = box.y + box.height / 2;
+  await page.mouse.move(x(from), y);
+  await page.mouse.down();
+  await page.mouse.move(x(to), y, { steps: 10 });
+  await page.mouse.up();
+};
+/** Waits until the throat has this height, as a part of that it had at first. */
+const height = (part) => viewer.until(`a throat of ${part} of its height`, async () => Math.abs((await viewer.extent("throat", 2)) / 0.1 - part) < 0.005);
+const cycle = async () => Number((await viewer.text("#moment-text")).match(/^cycle (\d+), time \S+$/)?.[1]);
+/** Waits until no more comes: what the slider asked for on its way has been shown too. */
+const rest = async () => {
+  for (let before = ""; ;) {
+    const now = `${(await viewer.look()).frames} ${await viewer.text("#moment-text")}`;
+    if (now === before) return;
+    before = now;
+    await page.waitForTimeout(600);
+  }
+};
+let last = null;
+
+const steps = [
+  ["a recording goes on by itself to its end, which is not that of the connection", async () => {
+    await page.goto(link);
+    const { role } = await viewer.until("a first picture", (now) => now.connection === "connected" && now.frames > 0);
+    check(role === "watcher", `the viewer of a recording is ${role}`);
+    check(!page.url().includes("token"), `the secret stays in ${page.url()}`);
+    check(await page.locator("#moment").isVisible(), "there is no slider");
+    await button("Again");
+    await height(0.8);
+    last = await viewer.look();
+    check(last.connection === "connected" && last.end === null && last.stack.length === 1, `at its end it is ${last.connection}, ${JSON.stringify(last.end)}, with the edits ${JSON.stringify(last.stack)}`);
+    check((await stand()) > 0.999, `the slider stands at ${await stand()}`);
+    await viewer.picture("end");
+  }],
+  ["it begins again, and rests", async () => {
+    await page.selectOption("#speed", "0.25");
+    await page.click("#play");
+    await button("Pause");
+    await page.click("#play");
+    await button("Play");
+  }],
+  ["the slider, dragged, shows another cycle with the shape that it had", async () => {
+    await drag(0.8, 0.25);
+    const isBefore = async ({ stack, cycle: shown }) => stack.length === 0 && shown < last.cycle / 2 && (await cycle()) < last.cycle / 2 && (await stand()) < 0.35;
+    await viewer.until("the moment of before the order", isBefore);
+    await height(1);
+    await rest();
+    check(await isBefore(await viewer.look()), `it is paused, and went on: ${await viewer.text("#moment-text")}`);
+    const { pixels } = await viewer.drawn();
+    await viewer.picture("before");
+    await drag(0.25, 0.8);
+    await viewer.until("the moment of behind the order", async ({ stack, cycle: shown }) => stack.length === 1 && shown > last.cycle / 2 && (await cycle()) > last.cycle / 2 && (await stand()) > 0.65);
+    await height(0.8);
+    check((await viewer.drawn()).pixels !== pixels, "the picture is that of before");
+  }],
+  ["nothing can be ordered of it", async () => {
+    const { orders, stack } = await viewer.look();
+    const why = await page.getAttribute("#pause", "title");
+    check(why === "This is a recording: it can be watched, and not be steered.", `the page says "${why}"`);
+    for (const selector of ["#apply", "#undo", "#redo", "#pause"]) check(await page.locator(selector).isDisabled(), `${selector} can be pressed`);
+    for (const selector of ["#wheel", "#pipelines-panel"]) check(await page.locator(selector).isHidden(), `${selector} is offered`);
+    await page.focus("#scene");
+    await page.keyboard.press("Control+z");
+    await page.waitForTimeout(300);
+    const seen = await viewer.look();
+    check(JSON.stringify([seen.orders, seen.stack]) === JSON.stringify([orders, stack]), "Ctrl+Z took something back");
+    check(seen.errors.length === 0, JSON.stringify(seen.errors));
+    check(viewer.complaints.length === 0, viewer.complaints.join("\n"));
+  }],
+];
+
+await run(steps, () => [viewer], () => browser.close());
