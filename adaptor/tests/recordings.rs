@@ -2,7 +2,7 @@
 
 mod common;
 
-use std::{path::Path, time::Duration};
+use std::{collections::BTreeSet, path::Path, time::Duration};
 
 use common::{Solver, Viewer, config, squeeze};
 use serde_json::{Value, json};
@@ -192,6 +192,11 @@ fn viewers_go_through_a_recording() {
     assert_eq!(newest, cycle);
     viewer.look_for("nothing", Duration::from_millis(600), |_| true);
     assert!(viewer.decoded().is_empty());
+    // At its beginning there is a picture too.
+    viewer.send(&json!({"play": {"seek": {"seconds": 0}}}));
+    viewer.wait_for("play", |play| play["seconds"].as_f64() < Some(seconds));
+    let views: BTreeSet<String> = viewer.decoded().into_iter().map(|frame| frame.view).collect();
+    assert!(views.contains("boundary"), "{views:?}");
     viewer.send(&json!({"play": {"seek": {"cycle": 0}, "paused": false, "speed": 100}}));
     viewer.wait_for("play", |play| play["at_end"] == true);
     // Who says much that is wrong is told no more of it than there is room for.

@@ -239,6 +239,12 @@ impl Recording {
         self.first
     }
 
+    /// The moment of the first frame; the first moment where there is none.
+    #[must_use]
+    pub fn first_frame(&self) -> Moment {
+        self.keys.kept.first().map_or(self.first, |key| key.moment)
+    }
+
     /// The last moment.
     #[must_use]
     pub fn last(&self) -> Moment {

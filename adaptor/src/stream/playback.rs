@@ -317,7 +317,9 @@ impl Player {
             self.speed = speed;
         }
         if let Some(seek) = seek {
-            let (first, last) = (self.recording.first().seconds, self.recording.last().seconds);
+            // Before its first frame a recording has nothing to show.
+            let first = self.recording.first_frame().seconds;
+            let last = self.recording.last().seconds;
             let seconds = match seek {
                 Seek::Seconds(seconds) => seconds,
                 Seek::Cycle(cycle) => self.recording.seconds_of_cycle(cycle),
@@ -383,7 +385,7 @@ impl Player {
         let orders: Vec<Value> = orders.into_iter().skip(skipped).map(|(_, told)| told).collect();
         let told = |moment: Moment| json!({"seconds": moment.seconds, "cycle": moment.cycle, "time": moment.time});
         let recording = json!({
-            "first": told(self.recording.first()),
+            "first": told(self.recording.first_frame()),
             "last": told(self.recording.last()),
             "lost_bytes": self.recording.lost_bytes(),
         });
