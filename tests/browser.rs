@@ -134,14 +134,14 @@ fn a_recording_in_a_browser() {
     small.write(
         "pipelines.json",
         &json!({"version": 1, "record": "run.tombolo", "pipelines": [
-            {"name": "surface", "every": {"steps": 30}, "stages": [{"surface": {}}, {"stream": {}}]}
+            {"name": "surface", "every": {"steps": 60}, "stages": [{"surface": {}}, {"stream": {}}]}
         ]}),
     );
     let pinch = json!({"edits": [{"scale_direction": {
         "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, 0.8]}}]});
-    small.write("orders.json", &json!([{"at": {"cycle": 1500}, "order": pinch}]));
+    small.write("orders.json", &json!([{"at": {"cycle": 3000}, "order": pinch}]));
     let options = ["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--headless"];
-    let run = Run::flow(&small.arguments(&[&options[..], &["--steps", "3000"]].concat()));
+    let run = Run::flow(&small.arguments(&[&options[..], &["--steps", "6000"]].concat()));
     let (status, text) = run.finish(PATIENCE);
     assert!(status.success(), "{text}");
     let mut played = Run::start(
