@@ -28,8 +28,8 @@ const UNKNOWN_TIME: Duration = Duration::from_secs(5);
 /// How long one that has shown a secret may go without a request answered before it has become a
 /// WebSocket.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
-/// How long a WebSocket may go without a byte from the viewer, who answers a ping every
-/// [`super::PING_PERIOD`].
+/// How long a WebSocket may go without a byte either way; it is pinged every [`super::PING_PERIOD`].
+/// That a network is gone is noticed by the system, which has nothing acknowledged.
 const SILENT_TIME: Duration = Duration::from_secs(30);
 /// How long a write may wait for a client that takes no byte.
 const WRITE_TIME: Duration = Duration::from_secs(20);
