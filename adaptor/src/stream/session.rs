@@ -32,8 +32,8 @@ use crate::lock::lock;
 
 /// Bytes of a message that are read of a viewer that does not drive: it may choose many views.
 pub(crate) const UNDRIVEN: usize = 1 << 14;
-/// Bytes of texts that wait for what is sent with them: a message of its own for each of many viewers
-/// costs the machine more than what it carries.
+/// Bytes of short texts that may wait to be written together with what comes next: for many viewers a
+/// write of its own for each text costs the machine more than its bytes.
 const GATHERED: usize = 1 << 12;
 /// How long a message beyond the allowance is held back before it is looked at again.
 const HELD_BACK: Duration = Duration::from_millis(100);
@@ -122,10 +122,12 @@ async fn write(
     // By view, the topology that was sent last.
     let mut topologies: HashMap<usize, u64> = HashMap::new();
     let mut ping = tokio::time::interval(PING_PERIOD);
+    // Bytes of texts since the last message that was sent at once.
     let mut gathered = 0;
     loop {
         let written = match client.next() {
             Ok(Some(Message::Hello { is_first })) => {
+                gathered = 0;
                 topologies.retain(|&view, _| hub.has_view(view));
                 // Of later ones the viewer hears one by one.
                 let orders = is_first.then(|| commands.orders());
@@ -142,9 +144,11 @@ async fn write(
                 }
             }
             Ok(Some(Message::Stack(change))) => {
+                gathered = 0;
                 sink.send(Wire::Text(change.text().written())).await
             }
             Ok(Some(Message::Frame(view, frame))) => {
+                gathered = 0;
                 // One that goes on from another follows a frame of the same topology.
                 let topology = frame.topology_id();
                 let is_known = topologies.insert(view, topology) == Some(topology);

@@ -132,8 +132,8 @@ const SEND_BUFFER: usize = 64 << 10;
 #[cfg(target_os = "linux")]
 const UNSENT: u32 = 16 << 10;
 
-/// How long what was sent may go without the network of the client acknowledging any of it. A ping is
-/// sent every [`super::PING_PERIOD`], so that one whose network is gone does not keep its place.
+/// How long the network of a client may leave unacknowledged what it was sent before its connection
+/// ends. Pings, one every [`super::PING_PERIOD`], are sent also where there is nothing else.
 #[cfg(target_os = "linux")]
 const UNACKNOWLEDGED: std::time::Duration = std::time::Duration::from_secs(30);
 
@@ -165,7 +165,7 @@ impl Listening {
 }
 
 /// Small messages (an order's outcome) do not wait for more bytes, and little lies in the system's
-/// buffers; a network that is gone is noticed. A socket that cannot be set so works too.
+/// buffers; a client whose network is gone loses its connection. A socket that cannot be set so works too.
 pub(super) fn hold_little(stream: &TcpStream) {
     let _ = stream.set_nodelay(true);
     let settings = socket2::SockRef::from(stream);

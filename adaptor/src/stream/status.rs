@@ -84,12 +84,29 @@ impl Hub {
 
 #[cfg(test)]
 mod tests {
+    use futures_util::FutureExt;
+
     use super::*;
     use crate::stream::{credentials::Access, hub::Arrival};
 
     /// Whether a status is told, and whether it has news.
     fn told(hub: &Hub) -> Option<(bool, Value)> {
         hub.new_status().map(|(is_news, status)| (is_news, status().into()))
+    }
+
+    #[test]
+    fn a_status_waits_for_another_message_until_the_next_is_due() {
+        let hub = Hub::default();
+        let Ok(Arrival::Client(viewer)) = hub.join(1, Access::Watch, true, true, None) else {
+            panic!("there is room for a viewer")
+        };
+        let is_woken = || viewer.wake.notified().now_or_never().is_some();
+        is_woken();
+        hub.status();
+        assert!(!is_woken());
+        // Nothing has changed, and nothing else was sent.
+        hub.status();
+        assert!(is_woken());
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 /** The longest pause between two pictures of new values, in milliseconds. */
 export const LONGEST_REST = 500;
-/** How long new values wait for a hand that shapes, in milliseconds from one of its shapes: longer than the next takes. */
+/** Milliseconds that new values wait after each shape of a drag: longer than the next shape takes. */
 export const SHAPING = 150;
 
 /** Time and the browser's chances to draw, so that a test can stand in for them. */
@@ -65,7 +65,7 @@ export class Rhythm {
     }, rest);
   }
 
-  /** A hand has made a shape, and may make another: new values wait a moment for it. */
+  /** Takes note of a shape of a drag: new values wait a moment for the next one. */
   shaped(): void {
     this.rested = Math.max(this.rested, Math.min(this.clock.now() + SHAPING, this.taken + LONGEST_REST));
   }
