@@ -6,7 +6,7 @@ mod common;
 
 use std::{io::Read, net::TcpListener, os::unix::fs::PermissionsExt, path::Path, time::Duration};
 
-use common::{Solver, config, program::tombolo, running::Running, squeeze};
+use common::{Solver, config, program::tombolo, running::Running, secrets, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Settings,
@@ -85,19 +85,15 @@ fn the_output_of_a_run_is_enough_to_steer_it() {
     assert!(code == 1 && said.contains(reason), "{code}: {said}");
 }
 
-/// What a run prints others may read: its secrets are in a file that only its owner can read, and what
-/// is printed to a terminal opens one browser, once.
+/// Others may read what a run prints: its secrets stay in a file that only its owner can read, and a
+/// link on a terminal lets one browser in, once.
 #[test]
 fn an_invitation_holds_no_secret() {
     let directory = tempfile::tempdir().expect("a folder");
     let config = config(r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"}}"#);
     let output = directory.path().to_owned();
     let mut solver = Solver::new(Settings { config, output, ..Settings::default() });
-    let links = [solver.adaptor.link(), solver.adaptor.watching_link()];
-    let secrets = links.map(|link| {
-        let link = link.expect("a server");
-        link.split_once("token=").expect("a secret").1.to_owned()
-    });
+    let secrets = secrets(&solver.adaptor);
     let mut invite =
         |terminal| solver.adaptor.invitation(terminal).expect("written").expect("a server");
     let (to_log, to_terminal, once_more) = (invite(false), invite(true), invite(true));

@@ -9,10 +9,10 @@ use std::{
     sync::{Mutex, Once, PoisonError},
 };
 
-use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
+use common::{LINK_TO_ALL, Solver, Viewer, config, secrets, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
-    Adaptor, Settings,
+    Settings,
     logging::{self, LevelFilter, LoggingError},
     pipelines::language::parse_orders,
 };
@@ -82,14 +82,6 @@ fn told(run: &str, field: &str, value: &str) -> Vec<Told> {
     let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let fits = |told: &&Told| told.get("run") == run && told.get(field) == value;
     kept.iter().filter(fits).cloned().collect()
-}
-
-/// The secrets of a run, for driving and for watching.
-fn secrets(adaptor: &Adaptor) -> [String; 2] {
-    [adaptor.link(), adaptor.watching_link()].map(|link| {
-        let link = link.expect("a server");
-        link.split_once("token=").expect("a secret").1.to_owned()
-    })
 }
 
 /// Checks that no field of any event so far has this text in it.
@@ -255,7 +247,7 @@ fn what_is_refused_is_told_once_with_who_and_what() {
     secrets(&solver.adaptor).iter().for_each(|secret| assert_untold(secret));
 }
 
-/// What such a request shows may be nearly right, or right: it is not told.
+/// A refused request is told without the secret that it showed, which may be right, or nearly right.
 #[test]
 fn a_wrong_secret_and_a_foreign_page_are_told_once_each() {
     listen();

@@ -278,7 +278,7 @@ impl Killed {
             let journal = self.journal();
             let begun = journal.rfind("{\"run\":").unwrap_or(0);
             let whole = journal[begun..].rsplit_once('\n').map_or("", |(whole, _)| whole);
-            // The same run may have made one before.
+            // A run that ends well saves its state at the end, and may have saved it before.
             let is_next =
                 |line: &&str| line.starts_with("{\"checkpoint\":") && **line != *self.line;
             if let Some(line) = whole.lines().rfind(is_next) {

@@ -16,6 +16,8 @@ use crate::peer;
 pub struct Desk {
     /// The last core; none where there is one alone.
     core: Option<usize>,
+    /// All cores that this process was given, as a list for `taskset`.
+    cores: String,
 }
 
 impl Desk {
@@ -36,16 +38,16 @@ impl Desk {
         }
         let Some((&last, others)) = cores.split_last().filter(|(_, others)| !others.is_empty())
         else {
-            return Ok(Self { core: None });
+            return Ok(Self { core: None, cores: allowed.into() });
         };
         let others: Vec<String> = others.iter().map(usize::to_string).collect();
         let arguments = ["--all-tasks", "--pid", "--cpu-list", &others.join(","), &own];
         peer::run(Command::new("taskset").args(arguments))?;
-        Ok(Self { core: Some(last) })
+        Ok(Self { core: Some(last), cores: allowed.into() })
     }
 
-    /// Lets threads of this process whose names begin so run on the core of the desk as well: a run that
-    /// has a core free beside those of its solver.
+    /// Lets the threads of this process whose names begin with `names` run on the core of the desk too,
+    /// as where a run has a core free beside those of its solver.
     ///
     /// # Errors
     /// Where the threads cannot be listed, or the program `taskset` fails.
@@ -60,7 +62,7 @@ impl Desk {
             }
             let id = thread.file_name();
             let mut all = Command::new("taskset");
-            all.args(["--pid", "--cpu-list", "0-4095"]).arg(id);
+            all.args(["--pid", "--cpu-list", &self.cores]).arg(id);
             peer::run(&mut all)?;
         }
         Ok(())

@@ -52,7 +52,7 @@ const MOST: Duration = Duration::from_secs(3600);
 /// Vertices that an edit of a large order moves.
 const LISTED: usize = 2000;
 
-/// Steps beside orders that are taken again without them.
+/// How many of the last steps beside orders are repeated without orders.
 const KEPT: usize = 40;
 
 /// How often the viewers come and go: within a minute a machine's own speed drifts by more than they
@@ -87,7 +87,7 @@ pub struct Run {
     moved: HashMap<String, f64>,
     /// When each cycle was shown.
     shown: HashMap<u64, f64>,
-    /// What the last steps had the mesh do, the newest first, [`KEPT`] at most: go to a shape, or rest.
+    /// The shapes of the last steps, at most [`KEPT`], the newest first; `None` where the mesh rested.
     last: VecDeque<Option<Vec<Vector>>>,
 }
 
@@ -203,9 +203,9 @@ impl Run {
         Ok(steps)
     }
 
-    /// Takes the last steps of another part again and again, with the same motion and without an
-    /// adaptor: what the solver itself takes for it. It ends in the shape in which it began.
-    fn again(
+    /// Repeats steps with the same motion, without an adaptor, and measures what the solver itself
+    /// takes. It ends in the shape in which it began.
+    fn repeat(
         &mut self,
         last: &VecDeque<Option<Vec<Vector>>>,
         least: Duration,
@@ -216,17 +216,17 @@ impl Run {
             for points in last.iter().rev() {
                 let start = Instant::now();
                 let fields = (self.solver.velocity(), self.solver.pressure());
-                self.go(points.as_deref())?;
+                self.step_solver(points.as_deref())?;
                 times.add(start.elapsed().as_secs_f64());
                 drop(fields);
             }
         }
-        self.go(Some(&now))?;
+        self.step_solver(Some(&now))?;
         Ok(times)
     }
 
     /// A step of the solver, with or without a motion.
-    fn go(&mut self, points: Option<&[Vector]>) -> Result<(), Box<dyn Error>> {
+    fn step_solver(&mut self, points: Option<&[Vector]>) -> Result<(), Box<dyn Error>> {
         self.solver.step(TIME_STEP, points.map(|points| Motion { points }))?;
         if let Some(points) = points {
             self.mesh = self.mesh.with_points(points.to_vec())?;
@@ -243,7 +243,7 @@ impl Run {
             return Err(format!("{rejected} orders of {given} were rejected: {reason}").into());
         }
         let last = self.last.clone();
-        let without = self.again(&last, Duration::from_secs(20))?;
+        let without = self.repeat(&last, Duration::from_secs(20))?;
         Ok((steps, seen, without))
     }
 
@@ -346,8 +346,8 @@ fn spread(times: &Times) -> [(&'static str, f64); 2] {
     [("median", times.median()), ("95th percentile", times.percentile(0.95))]
 }
 
-/// The solver takes longer for a mesh that moves, whoever moves it: what orders cost is what steps take
-/// beyond those with the same motion without orders.
+/// The cost of orders: the median step beside them against that with the same motion without them. A
+/// mesh that moves costs the solver more, whoever moves it.
 fn against_motion(part: &str, steps: &Steps, without: &Times) -> Target {
     let ratio = steps.whole.median() / without.median();
     Target::at_most(format!("{part}: step, median, against the same motion unasked"), ratio, 1.05)

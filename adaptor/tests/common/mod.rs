@@ -33,6 +33,14 @@ pub fn config(text: &str) -> Config {
     language::parse(text, "test.json").expect("a configuration")
 }
 
+/// The secrets of a run with a server, for driving and for watching.
+pub fn secrets(adaptor: &Adaptor) -> [String; 2] {
+    [adaptor.link(), adaptor.watching_link()].map(|link| {
+        let link = link.expect("a server");
+        link.split_once("token=").expect("a secret").1.to_owned()
+    })
+}
+
 /// Squeezes the box of [`Solver`] from above.
 pub fn squeeze(by: f64) -> Value {
     json!({"edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -by]}}]})

@@ -24,13 +24,13 @@ pub const MONITORED: &str = r#"{"version": 1, "stream": {"listen": "127.0.0.1:0"
     {"name": "boundary", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
     {"name": "health", "every": {"steps": 1}, "stages": [{"statistics": {"field": "speed"}}]}]}"#;
 
-/// A solver that steps on a thread of its own, until it is told to stop, its run is, or this is dropped.
+/// A solver that steps on a thread of its own, until a viewer or this stops it, or this is dropped.
 pub struct Running {
     over: Arc<AtomicBool>,
     cycle: Arc<AtomicU64>,
     /// Milliseconds from step to step.
     rest: Arc<AtomicU64>,
-    /// Those that the solver rests for now; 0 while it is in a call.
+    /// Milliseconds for which the solver rests now; 0 while it is in a call.
     rests_for: Arc<AtomicU64>,
     thread: Option<JoinHandle<Report>>,
 }
