@@ -36,6 +36,7 @@ import { StatusBar } from "./panels/status";
 import { VerdictPanel } from "./panels/verdict";
 import { watchDrawers } from "./panels/drawers";
 import { WorstCells } from "./panels/quality";
+import { QualityHistogram } from "./panels/quality-histogram";
 import { SlicePanel } from "./panels/slice";
 import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
@@ -328,6 +329,7 @@ const forecasts = new Forecasts(store, {
   ask: (order) => commands.ask({ forecast: order }),
   withdraw: () => void commands.ask({ withdraw_forecast: {} }),
 });
+new QualityHistogram(store);
 new VerdictPanel(store, commands, (place) => scene.camera.flyTo(place), () => form.focusProblem());
 watchKeys(store, commands);
 new Tour(() => {

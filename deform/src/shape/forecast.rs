@@ -44,6 +44,9 @@ pub struct Forecast {
     pub sub_steps: usize,
     /// The quality of the mesh in the end.
     pub quality: Option<Quality>,
+    /// The quality of the mesh where the order would begin.
+    #[serde(default)]
+    pub quality_before: Option<Quality>,
     /// How its cells differ from those of the reference mesh.
     pub change: Option<Change>,
     /// Seconds that it took to find out.
@@ -91,6 +94,7 @@ impl Shaper {
         let volume = plan.judged() == Judged::Volume;
         let domain = &self.body.domain;
         let cells = domain.mesh().cells();
+        let quality_of = |points| volume.then(|| quality(cells, points).gathered(domain));
         Forecast {
             outcome: if target.fraction < 1.0 { Outcome::Clamped } else { Outcome::Applied },
             reason: None,
@@ -101,7 +105,8 @@ impl Shaper {
             largest_displacement: Some(plan.largest_displacement()),
             shapes: plan.shapes(),
             sub_steps: target.sub_steps,
-            quality: volume.then(|| quality(cells, plan.end()).gathered(domain)),
+            quality: quality_of(plan.end()),
+            quality_before: quality_of(plan.start()),
             change: volume.then(|| change(domain, plan.end())),
             seconds: plan.seconds(),
         }
@@ -128,6 +133,7 @@ impl Forecast {
             shapes: 0,
             sub_steps: 0,
             quality: None,
+            quality_before: None,
             change: None,
             seconds,
         }

@@ -139,6 +139,10 @@ fn shapes_are_those_of_one_process() {
                     (of_parts.quality.unwrap(), forecast.quality.clone().unwrap());
                 assert_eq!((quality.cells, quality.inverted), (expected.cells, 0));
                 assert!((quality.mean - expected.mean).abs() < 1e-7);
+                // It begins at the reference mesh.
+                let before = of_parts.quality_before.unwrap();
+                let expected = crate::quality::quality(mesh.cells(), mesh.points());
+                assert_eq!((before.cells, before.histogram), (expected.cells, expected.histogram));
                 let (change, expected) = (of_parts.change.unwrap(), forecast.change.unwrap());
                 assert!((change.volume_ratio.mean - expected.volume_ratio.mean).abs() < 1e-7);
                 // Back: exactly.

@@ -72,7 +72,13 @@ export interface Hello {
 /** The message of the server: the edits themselves are fetched. `stack` is in the first of a connection. */
 export type ToldHello = Omit<Hello, "stack" | "isAwaitingEdits" | "undoable"> & { stack?: StackInformation };
 
-export interface QualitySummary { min: number; mean?: number; inverted?: number }
+export interface QualitySummary {
+  min: number;
+  mean?: number;
+  inverted?: number;
+  /** How many cells have a scaled Jacobian in each of equal classes from -1 to 1. */
+  histogram?: number[];
+}
 
 /** What a pipeline has cost so far; it runs at one in `every` of its times. */
 export interface PipelineCost { name: string; runs: number; seconds: number; bytes: number; memory: number; every: number }
@@ -130,6 +136,8 @@ export interface ForecastAnswer {
     /** Where it would fail: the worst cell, or the first face that is broken. */
     place?: Vector | null;
     quality?: QualitySummary | null;
+    /** That of the mesh where it would begin. */
+    quality_before?: QualitySummary | null;
     seconds?: { surface?: number; volume?: number; guard?: number } | null;
   };
 }
