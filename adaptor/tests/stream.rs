@@ -428,8 +428,11 @@ fn only_the_token_lets_anybody_in() {
     assert!(get(&solver.adaptor, "/?token=0123", "").starts_with("HTTP/1.1 401"));
     let page = get(&solver.adaptor, "/", "");
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("text/html"), "{page}");
-    for header in ["no-cache", "nosniff", "content-security-policy"] {
-        assert!(page.contains(header), "{header}");
+    let policy = "content-security-policy: default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; \
+        style-src 'self' 'unsafe-inline'; style-src-attr 'none'; img-src 'self' data: blob:; worker-src 'self'; \
+        connect-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n";
+    for header in ["no-cache", "nosniff", policy] {
+        assert!(page.contains(header), "{header}: {page}");
     }
     assert!(get(&solver.adaptor, "/no/such/file", "").starts_with("HTTP/1.1 404"));
     assert!(get(&solver.adaptor, "/../Cargo.toml", "").starts_with("HTTP/1.1 4"));

@@ -29,8 +29,9 @@ const HEADERS: [(HeaderName, &str); 3] = [
 ];
 
 /// The content security policy of the viewer, up to the names of the pages that may show it in a frame.
+/// The editor of pipelines brings its styles as elements; nothing has them as attributes.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
-    img-src 'self' data: blob:; worker-src 'self' blob:; connect-src 'self'; object-src 'none'; \
+    style-src-attr 'none'; img-src 'self' data: blob:; worker-src 'self'; connect-src 'self'; object-src 'none'; \
     base-uri 'none'; form-action 'none'; frame-ancestors";
 
 /// The policy that allows nothing at all.

@@ -170,7 +170,9 @@ export class EditsPanel {
   private pendingRow(order: OrderRecord): HTMLElement {
     const steering = whyNotSteering(this.store.state) === "";
     const fraction = order.shapes ? (order.shape ?? 0) / order.shapes : 0;
-    const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, element("div", order.status === "applying" ? { style: `width: ${100 * fraction}%` } : {}));
+    const done = element("div");
+    if (order.status === "applying") done.style.width = `${100 * fraction}%`;
+    const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, done);
     return element("li", { "data-order": order.id, "data-status": order.status },
       element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
         steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
