@@ -1,27 +1,16 @@
 /**
- * Measures the viewer in Debian's Chromium, watching the run at TOMBOLO_URL, and prints one line of JSON: seconds and bytes. The
- * picture is turned while frames come, by keys and by the mouse, the throat, where there is one, is dragged, and the heap is looked at before and after.
- *
- * CHROMIUM  the browser (default /usr/bin/chromium)
- *
- * Needs the packages of viewer/ (`npm ci` there).
+ * Measures the viewer in Debian's Chromium, watching the run at TOMBOLO_URL, and prints one line of JSON: seconds and bytes. Frames are
+ * timed from their arrival to the picture, which is turned while they come, by keys and by the mouse; the throat, where there is one, is
+ * dragged; the heap is looked at before and after.
  */
-import { createRequire } from "node:module";
+import { heap, link, openBrowser } from "./browser.mjs";
 
-const { chromium } = createRequire(new URL("../../viewer/package.json", import.meta.url))("playwright-core");
-
-const FRAMES = 150, DRAGS = 60, HEAP_SECONDS = 30, BROWSER_SECONDS = 2, HANDLE = "throat";
-const link = process.env.TOMBOLO_URL;
-if (!link) throw new Error("TOMBOLO_URL is not set: it is the link that the run printed");
+const FRAMES = 150, SHOWN = 40, DRAGS = 60, HEAP_SECONDS = 30, BROWSER_SECONDS = 2, HANDLE = "throat";
 
 const sorted = (list) => [...list].sort((a, b) => a - b);
 const spread = (list) => ({ median: sorted(list)[list.length >> 1], late: sorted(list)[Math.floor(0.95 * (list.length - 1))] });
 
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--js-flags=--expose-gc"],
-});
+const browser = await openBrowser();
 try {
   const page = await browser.newPage({ viewport: { width: 1280, height: 800 } });
   page.setDefaultTimeout(120_000);
@@ -43,6 +32,27 @@ try {
       } else requestAnimationFrame(look);
     };
     requestAnimationFrame(look);
+
+    // How long a frame takes from its arrival: to its values in the picture that the browser draws next, and to the picture after that.
+    window.shown = [];
+    let arrived = null;
+    window.WebSocket = class extends WebSocket {
+      constructor(...all) {
+        super(...all);
+        this.addEventListener("message", ({ data }) => {
+          if (data instanceof ArrayBuffer) arrived ??= { at: performance.now(), frames: window.tombolo?.frames ?? 0 };
+        });
+      }
+    };
+    const time = () => {
+      if (arrived && window.tombolo?.frames > arrived.frames) {
+        const { at } = arrived;
+        arrived = null;
+        requestAnimationFrame((next) => { window.shown.push((next - at) / 1000); });
+      }
+      requestAnimationFrame(time);
+    };
+    requestAnimationFrame(time);
   });
   // A browser that was only just started is busy with itself: the page is opened in one that is there already.
   await page.waitForTimeout(BROWSER_SECONDS * 1000);
@@ -50,6 +60,10 @@ try {
   const firstPicture = await (await page.waitForFunction(() => window.firstPicture)).jsonValue();
   await page.waitForTimeout(1000);
   const triangles = await page.evaluate(() => Object.values(window.tombolo.views).reduce((sum, view) => sum + view.triangles, 0));
+
+  await page.evaluate(() => { window.shown = []; });
+  await page.waitForFunction((count) => window.shown.length >= count, SHOWN);
+  const shown = await page.evaluate(() => window.shown);
 
   /** How long frames take, and how many cycles come in one: a viewer that shows no new values would be quick. */
   const watch = (frames, isByKey) => page.evaluate(async ([count, isTurning]) => {
@@ -95,7 +109,7 @@ try {
     return window.tombolo.featurePlace(name);
   }, HANDLE);
   if (place) {
-    const shown = () => page.waitForFunction(() => {
+    const drawn = () => page.waitForFunction(() => {
       const { state, milliseconds, reason } = window.tombolo.preview;
       if (state === "failed") throw new Error(reason);
       return state === "shown" && milliseconds;
@@ -106,7 +120,7 @@ try {
     await page.mouse.down();
     for (let step = 1; step <= DRAGS; step++) {
       await page.mouse.move(place[0] + 2 * step, place[1] - step);
-      times.push(await (await shown()).jsonValue() / 1000);
+      times.push(await (await drawn()).jsonValue() / 1000);
     }
     await page.mouse.up();
     await page.keyboard.up("Control");
@@ -116,17 +130,13 @@ try {
     if (await page.locator("#cancel").isVisible()) await page.click("#cancel");
   }
 
-  const heap = () => page.evaluate(() => {
-    window.gc();
-    return performance.memory.usedJSHeapSize;
-  });
   await page.waitForTimeout(3000);
-  const before = await heap();
+  const before = await heap(page);
   await page.waitForTimeout(HEAP_SECONDS * 1000);
-  const heapGrowth = (await heap()) - before;
+  const heapGrowth = (await heap(page)) - before;
 
   console.log(JSON.stringify({
-    triangles, first_picture: firstPicture / 1000, wire, rotating: spread(byKeys.times), frames_with_values: byKeys.came,
+    triangles, first_picture: firstPicture / 1000, wire, shown: spread(shown), rotating: spread(byKeys.times), frames_with_values: byKeys.came,
     rotating_by_mouse: spread(byMouse.times), longest_task: longestTask, first_preview: firstPreview, dragging, heap_growth: heapGrowth,
   }));
 } finally {

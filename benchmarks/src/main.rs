@@ -14,6 +14,7 @@
 //! cargo run --release -p tombolo-benchmarks -- growth --json
 //! cargo run --release -p tombolo-benchmarks -- extract --json
 //! cargo run --release -p tombolo-benchmarks -- viewer --json
+//! cargo run --release -p tombolo-benchmarks -- viewer-memory --json
 //! cargo run --release -p tombolo-benchmarks -- python --json
 //! cargo run --release -p tombolo-benchmarks -- stream --json
 //! cargo run --release -p tombolo-benchmarks -- paraview --json
@@ -45,6 +46,7 @@ mod surface;
 mod surface_wasm;
 mod untangle;
 mod viewer;
+mod viewer_memory;
 mod volume;
 mod volume_case;
 #[cfg(feature = "distributed")]
@@ -119,6 +121,8 @@ enum Name {
     Extract,
     /// The viewer in a browser, watching a run: its pictures, its previews, its memory.
     Viewer,
+    /// The memory of the viewer's page over half an hour.
+    ViewerMemory,
     /// The cost of `execute` from Python when nothing is due, and the memory that lending a mesh takes.
     Python,
     /// Streaming a surface from a solver in Python to another process, beside Rerun.
@@ -165,6 +169,7 @@ fn main() -> ExitCode {
         Name::Growth => text(growth::run(), json),
         Name::Extract => text(extract::run(), json),
         Name::Viewer => text(viewer::run(), json),
+        Name::ViewerMemory => text(viewer_memory::run(), json),
     })
 }
 

@@ -6,12 +6,15 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use serde::Deserialize;
+use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::json;
 use tombolo_tests::{Run, project};
 
 use crate::peer::{self, mesh_file};
 use crate::report::{Report, Row, Target};
+
+/// The script that measures all but what half an hour takes.
+const SCRIPT: &str = "viewer.mjs";
 
 /// Slices of the channel of 60 000 tetrahedra that have 200 000 triangles together.
 const PLANES: usize = 32;
@@ -22,6 +25,7 @@ struct Seen {
     triangles: usize,
     first_picture: f64,
     wire: f64,
+    shown: Spread,
     rotating: Spread,
     frames_with_values: f64,
     rotating_by_mouse: Spread,
@@ -42,20 +46,20 @@ struct Spread {
 pub fn run() -> Result<Report, Box<dyn Error>> {
     mesh_file("channel-60k")?;
     mesh_file("bypass-3")?;
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let release = ["build", "--release", "--quiet", "-p", "tombolo-flow"];
-    peer::run(Command::new(cargo).current_dir(project()).args(release))?;
+    built()?;
     let directory = tempfile::tempdir()?;
-    let demo = watch("nozzle", None)?;
+    let demo: Seen = watched("nozzle", None, SCRIPT)?;
     let many = directory.path().join("many.json");
     fs::write(&many, many_triangles().to_string())?;
-    let many = watch("nozzle", Some(&many))?;
-    let large = watch("bypass-3", None)?;
+    let many: Seen = watched("nozzle", Some(&many), SCRIPT)?;
+    let large: Seen = watched("bypass-3", None, SCRIPT)?;
 
     let mut rows = Vec::new();
     for (seen, what) in [(&demo, "demo"), (&many, "slices"), (&large, "bypass of 481 545 cells")] {
         let name = |measured: &str| format!("{what}, {} triangles: {measured}", seen.triangles);
         rows.push(Row::new(name("page to first picture"), seen.first_picture));
+        rows.push(Row::new(name("frame arrived, decoded and shown"), seen.shown.median));
+        rows.push(Row::new(name("the same, 95th percentile"), seen.shown.late));
         rows.push(Row::new(name("frame, rotating while streaming"), seen.rotating.median));
         rows.push(Row::new(name("the same, 95th percentile"), seen.rotating.late));
         rows.push(Row::new(name("streamed frames in one of these"), seen.frames_with_values));
@@ -74,6 +78,9 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
     let targets = vec![
         Target::at_most("22 k, frame, rotating while streaming [s]", demo.rotating.median, 0.025),
         Target::at_most("200 k, frame, rotating while streaming [s]", many.rotating.median, 0.06),
+        Target::at_most("200 k, frame arrived, decoded and shown [s]", many.shown.median, 0.1),
+        Target::at_most("22 k, longest task while streaming [s]", demo.longest_task, 0.05),
+        Target::at_most("200 k, longest task while streaming [s]", many.longest_task, 0.05),
         Target::at_most("page to first picture [s]", demo.first_picture, 0.6),
         Target::at_most("480 k cells, page to first picture [s]", large.first_picture, 1.0),
         Target::at_most("first load on the wire [bytes]", demo.wire, 0.7e6),
@@ -89,8 +96,20 @@ pub fn run() -> Result<Report, Box<dyn Error>> {
     Ok(Report { rows, targets })
 }
 
-/// Watches a run of a case of `flow`, with its own pipelines or others.
-fn watch(case: &str, pipelines: Option<&Path>) -> Result<Seen, Box<dyn Error>> {
+/// Builds `flow` as it is measured.
+pub(crate) fn built() -> Result<(), Box<dyn Error>> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let release = ["build", "--release", "--quiet", "-p", "tombolo-flow"];
+    peer::run(Command::new(cargo).current_dir(project()).args(release))?;
+    Ok(())
+}
+
+/// Watches a run of a case of `flow`, with its own pipelines or others, by a script of `benchmarks/browser`.
+pub(crate) fn watched<Seen: DeserializeOwned>(
+    case: &str,
+    pipelines: Option<&Path>,
+    script: &str,
+) -> Result<Seen, Box<dyn Error>> {
     let output = tempfile::tempdir()?;
     // It stands for another machine: what it computes is not to be taken from the browser.
     let mut flow = Command::new("nice");
@@ -110,7 +129,7 @@ fn watch(case: &str, pipelines: Option<&Path>) -> Result<Seen, Box<dyn Error>> {
         Command::new("node")
             .current_dir(project())
             .env("TOMBOLO_URL", link.url())
-            .arg("benchmarks/browser/viewer.mjs"),
+            .arg(Path::new("benchmarks/browser").join(script)),
     )?;
     Ok(serde_json::from_str(&printed)?)
 }
