@@ -8,11 +8,13 @@ import { isMuted, titleOf } from "../form/describe";
 import { digits, seconds } from "../number";
 import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
-import { isCancellable, isPending, isRedoable, isRefused, move, provenance, remove, rename, toggleMute, undoable, whyNotEditable } from "../store/edits";
+import { kindOf, partsOf } from "../store/draft";
+import { asFormOrder, isCancellable, isPending, isRedoable, isRefused, move, provenance, remove, rename, toggleMute, undoable, whyNotEditable } from "../store/edits";
 import { whyNotSteering } from "../store/run";
 import type { OrderPhase, OrderRecord, State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
+import { floored, passingPart, percent } from "../store/verdict";
 
 const REFUSED_SHOWN = 3;
 const PHASES: Record<OrderPhase, string> = {
@@ -183,7 +185,24 @@ export class EditsPanel {
     return element("li", { "data-order": order.id, "data-status": order.status },
       element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
         element("button", { type: "button", class: "icon", title: "Take it off the list", "aria-label": `Dismiss: ${order.text}`, onclick: () => this.store.dispatch({ type: "order dismissed", id: order.id }) }, "×")),
-      element("div", { class: "detail" }, detailOf(order)));
+      element("div", { class: "detail" }, detailOf(order)), element("div", { class: "ways" }, ...this.waysBack(order)));
+  }
+
+  /** The ways from a refused order back into the form, where the form can hold it: as it was, or as much of it as would pass. */
+  private waysBack(order: OrderRecord): HTMLElement[] {
+    const { state } = this.store;
+    const asked = asFormOrder(order.order, this.stack);
+    if (!asked || kindOf(state, partsOf(asked.edit)?.key ?? null) === null) return [];
+    const way = (act: string, text: string, title: string, fraction: number, focus: string): HTMLElement => element("button", {
+      type: "button", class: "small", "data-act": act, title, "aria-label": `${text}: ${order.text}`, onclick: () => {
+        this.store.dispatch({ type: "order taken up", id: order.id, fraction });
+        part(focus).focus();
+      },
+    }, text);
+    const again = way("again", "Edit again", "Loads what it asked for into the form, to change it", 1, "foot");
+    const passing = order.status === "rejected" ? passingPart(order.fraction) : null;
+    if (passing === null) return [again];
+    return [way("part", `Apply ${percent(passing)}`, "Loads it into the form with as much of the amount as would pass", floored(passing), "apply"), again];
   }
 
   private showUndo({ undo, redo, why, composing }: ReturnType<typeof undoState>): void {

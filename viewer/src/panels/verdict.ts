@@ -7,7 +7,7 @@ import type { Values } from "../form/schema";
 import { asksNothing, isDivisible, isObject, sameFields, wholeOf } from "../store/draft";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
-import { applyButton, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../store/verdict";
+import { applyButton, floored, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../store/verdict";
 import type { Line } from "../store/verdict";
 
 export class VerdictPanel {
@@ -136,6 +136,3 @@ export class VerdictPanel {
     this.store.dispatch({ type: "remedy", settings: { guard: { ...guard, otherwise: "untangle" } } });
   }
 }
-
-/** A part of which no more than a thousandth is cut off. */
-const floored = (fraction: number): number => (fraction >= 1 ? 1 : Math.floor(1000 * fraction) / 1000);

@@ -65,6 +65,8 @@ export type Action =
   | { type: "remedy"; settings: Values }
   | { type: "cleared" }
   | { type: "edit loaded"; index: number }
+  /** What an order has asked for stands in the form again, `fraction` of it. */
+  | { type: "order taken up"; id: string; fraction: number }
   | { type: "step back" }
   | { type: "step forward" }
   // What is computed of it.

@@ -1,5 +1,6 @@
 /** The edits that the shape has, the orders that brought them, and what can be done with them: pure functions of the state. */
 import type { Json } from "../connection/protocol";
+import type { Values } from "../form/schema";
 import { isObject, partsOf } from "./draft";
 import { whyNotSteering } from "./run";
 import type { OrderRecord, State } from "./state";
@@ -59,6 +60,29 @@ export function undoable(state: State): number {
 export function isRedoable(state: State): boolean {
   const left = state.undone.at(-1);
   return left !== undefined && !sameJson(left, state.hello?.stack);
+}
+
+/** An order as the form composes it: its edit, which edit of the stack that replaces, and what is set beside. */
+export interface FormOrder { edit: Json; updating: number | null; settings: Values }
+
+/**
+ * An order as the form composes it for the stack that there is now; null where it asks for something else, such as several edits or another
+ * sequence. One that replaced an edit still does where others have been added behind.
+ */
+export function asFormOrder(order: Json | undefined, now: readonly Json[]): FormOrder | null {
+  if (!isObject(order)) return null;
+  const { edits, stack, undo, ...settings } = order;
+  if (undo !== undefined) return null;
+  if (Array.isArray(edits) && stack === undefined) return edits.length === 1 ? { edit: edits[0]!, updating: null, settings } : null;
+  if (!Array.isArray(stack)) return null;
+  const others = stack.flatMap((edit, index) => (sameJson(edit, now[index]) ? [] : [{ edit, index }]));
+  const [other] = others;
+  if (!other || others.length > 1) return null;
+  const { edit, index } = other;
+  if (index === now.length) return { edit, updating: null, settings };
+  // What was taken out of the stack, or stands elsewhere in it, is no edit that was changed.
+  const isMoved = now.some((known) => sameJson(known, edit));
+  return isMoved || partsOf(edit)?.key !== partsOf(now[index])?.key ? null : { edit, updating: index, settings };
 }
 
 /** The order by which each edit of the stack came or was last changed; null where that is not known. */

@@ -6,11 +6,12 @@ import type { Values } from "../form/schema";
 import { own } from "../own";
 import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
+import { asFormOrder } from "./edits";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { pipelinesAfter } from "./pipeline-drafts";
 import { NO_FORECAST } from "./state";
-import type { Composed, Draft, Frames, Part, State } from "./state";
+import type { Composed, Draft, Frames, Part, SelectionState, State } from "./state";
 import { sameJson } from "./store";
 
 /** Steps of the form that can be taken back. */
@@ -109,6 +110,7 @@ function after(state: State, action: Action): State {
     case "remedy": return { ...state, draft: { ...state.draft, remedy: action.settings } };
     case "cleared": return cleared(state);
     case "edit loaded": return withEditLoaded(state, action.index);
+    case "order taken up": return withOrderTakenUp(state, action.id, action.fraction);
     case "step back": return steppedBack(state, true);
     case "step forward": return steppedForward(state);
     case "preview": return { ...state, preview: action.preview };
@@ -211,7 +213,9 @@ function withPart(parts: State["selection"]["parts"], feature: string, part: Par
   return part === null ? rest : { ...rest, [feature]: part };
 }
 
-const composed = (state: State): Composed => ({ key: state.draft.key, bodies: state.draft.bodies, parts: state.selection.parts, updating: state.draft.updating });
+function composed({ draft: { key, bodies, settings, remedy, updating }, selection: { parts } }: State): Composed {
+  return { key, bodies, settings, remedy, parts, updating };
+}
 
 /** The state with another draft, as a step that can be taken back; all of one step together. */
 function stepped(state: State, draft: Draft, step: string): State {
@@ -220,8 +224,8 @@ function stepped(state: State, draft: Draft, step: string): State {
 }
 
 function brought(state: State, to: Composed, past: readonly Composed[], future: readonly Composed[]): State {
-  const { key, bodies, parts, updating } = to;
-  const draft = { ...state.draft, key, bodies, updating, problems: [], amount: null, step: null, past, future };
+  const { parts, ...held } = to;
+  const draft = { ...state.draft, ...held, problems: [], amount: null, step: null, past, future };
   return { ...state, draft, selection: { ...state.selection, parts } };
 }
 
@@ -244,20 +248,45 @@ function cleared(state: State): State {
   return { ...state, refusal: "", draft, forecast: NO_FORECAST };
 }
 
-/** An edit of the stack in the form, to be changed. */
-function withEditLoaded(state: State, index: number): State {
-  const loaded = partsOf(state.hello?.stack[index]);
+/** What the form is to hold of an edit; null where it has no form for it. */
+function inForm(state: State, edit: Json | undefined): { key: string; body: Values; parts: SelectionState["parts"] } | null {
+  const loaded = partsOf(edit);
   const kind = kindOf(state, loaded?.key ?? null);
-  if (!loaded || !kind) return state;
+  if (!loaded || !kind) return null;
   const fields = Object.fromEntries(Object.entries(withoutShorthand(kind, loaded.body)).filter(([name, value]) => ROLES[name] === undefined && value !== null));
   const parts = new Map<string, Part>();
   for (const [name, part] of Object.entries(ROLES)) {
     const names = loaded.body[name];
     if (Array.isArray(names)) for (const feature of names) if (typeof feature === "string" && !parts.has(feature)) parts.set(feature, part);
   }
+  return { key: kind.key, body: { ...kind.neutral, ...fields }, parts: Object.fromEntries(parts) };
+}
+
+/** An edit of the stack in the form, to be changed. */
+function withEditLoaded(state: State, index: number): State {
+  const held = inForm(state, state.hello?.stack[index]);
+  if (!held) return state;
   const before = cleared(state);
-  const draft = { ...before.draft, key: kind.key, bodies: { ...before.draft.bodies, [kind.key]: { ...kind.neutral, ...fields } }, updating: index };
-  return { ...before, draft, selection: { ...state.selection, parts: Object.fromEntries(parts) } };
+  const draft = { ...before.draft, key: held.key, bodies: { ...before.draft.bodies, [held.key]: held.body }, updating: index };
+  return { ...before, draft, selection: { ...state.selection, parts: held.parts } };
+}
+
+/** What an order has asked for in the form again, as a step that can be taken back. */
+function withOrderTakenUp(state: State, id: string, fraction: number): State {
+  const order = asFormOrder(state.orders.find((known) => known.id === id)?.order, state.hello?.stack ?? []);
+  const held = order && inForm(state, order.edit);
+  if (!held) return state;
+  const { guard, ...settings } = order.settings;
+  const { draft } = cleared(state);
+  // Mending was asked for by what stood in the form, or for this edit alone: then it is not for those that follow.
+  const isOfForm = guard === undefined || sameJson(guard, state.draft.settings.guard);
+  const next = {
+    ...draft, key: held.key, bodies: { ...draft.bodies, [held.key]: held.body }, updating: order.updating,
+    settings: isOfForm && guard !== undefined ? { ...settings, guard } : settings, remedy: isOfForm ? {} : { guard },
+    past: state.draft.past, step: state.draft.step,
+  };
+  const taken = { ...stepped({ ...state, refusal: "" }, next, `order ${id}`), selection: { ...state.selection, parts: held.parts } };
+  return fraction < 1 ? withAmount(taken, fraction) : taken;
 }
 
 function withAmount(state: State, fraction: number): State {

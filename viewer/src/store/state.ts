@@ -15,7 +15,7 @@ export interface SelectionState { parts: Readonly<Record<string, Part>>; hovered
 export interface Problem { field: string; text: string }
 
 /** What a step back in the form brings back. */
-export interface Composed { key: string | null; bodies: Readonly<Record<string, Values>>; parts: Readonly<Record<string, Part>>; updating: number | null }
+export interface Composed extends Pick<Draft, "key" | "bodies" | "settings" | "remedy" | "updating"> { parts: Readonly<Record<string, Part>> }
 
 /** What stands in the form. */
 export interface Draft {

@@ -55,6 +55,12 @@ export function forecastLine({ forecast: { state, answer, reason }, status }: Pi
 /** A part in per cent, rounded down: what is filled in for it does pass. */
 export const percent = (fraction: number): string => `${fraction >= 0.1 ? Math.floor(100 * fraction) : digits(Math.floor(1000 * fraction) / 10, 2)} %`;
 
+/** A part of which no more than a thousandth is cut off: what is filled in for one that passes. */
+export const floored = (fraction: number): number => (fraction >= 1 ? 1 : Math.floor(1000 * fraction) / 1000);
+
+/** The part of what was refused that would pass, where it is told and worth asking for; else null. */
+export const passingPart = (fraction: number | null | undefined): number | null => (typeof fraction === "number" && fraction > 0.001 ? fraction : null);
+
 /** An open boundary that would move, in words; empty where none does. */
 export function openBoundaryWarning(state: State): string {
   const [first, ...more] = openBoundariesMoved(state).sort((a, b) => b.by - a.by);
@@ -83,8 +89,7 @@ export interface Remedies { fraction: number | null; untangle: boolean; worst: V
 export function remedies(state: State): Remedies | null {
   const { answer } = state.forecast;
   if (answer?.outcome !== "rejected") return null;
-  const fraction = typeof answer.fraction === "number" && answer.fraction > 0.001 ? answer.fraction : null;
-  return { fraction, untangle: mayUntangle(state), worst: answer.place ?? null };
+  return { fraction: passingPart(answer.fraction), untangle: mayUntangle(state), worst: answer.place ?? null };
 }
 
 /** Whether what is refused could pass if the guard untangled it: cells, and a surface that breaks where the edit leaves it free. */

@@ -2,6 +2,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import type { Json } from "../../src/connection/protocol";
 import { EditsPanel } from "../../src/panels/edits";
+import { bodyOf } from "../../src/store/draft";
 import { move, remove, rename, toggleMute } from "../../src/store/edits";
 import { page } from "../page";
 import { openDocument } from "./document";
@@ -130,6 +131,34 @@ describe("the list of edits", () => {
     document.querySelector<HTMLElement>("#pending .icon")!.click();
     expect(document.querySelector("#pending")!.textContent).toBe("");
     expect(document.querySelector("#orders")!.textContent).toMatch(/cells invert/);
+  });
+
+  it("brings a refused order back into the form, as it was or as much of it as would pass", () => {
+    const orderOf = (id: string, order: Json, fraction: number | null): void => made.store.dispatch({ type: "order", status: { id, status: "rejected", order, reason: "cells invert", fraction } });
+    const ways = (id: string): string[] => [...document.querySelectorAll(`#pending [data-order="${id}"] .ways button`)].map(({ textContent }) => textContent);
+    const press = (id: string, act: string): void => document.querySelector<HTMLElement>(`#pending [data-order="${id}"] [data-act="${act}"]`)!.click();
+    orderOf("o1", { edits: [shift(9, { fixed: ["inlet"] })] }, 0.4709);
+    expect(ways("o1")).toEqual(["Apply 47 %", "Edit again"]);
+    made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
+    press("o1", "again");
+    const { state } = made.store;
+    expect([bodyOf(state.draft).by, state.draft.updating, state.selection.parts]).toEqual([[9, 0, 0], null, { wall: "handle", inlet: "fixed" }]);
+    expect(document.activeElement?.id).toBe("foot");
+    made.store.dispatch({ type: "step back" });
+    expect(made.store.state.selection.parts).toEqual({ throat: "handle" });
+    press("o1", "part");
+    expect(bodyOf(made.store.state.draft).by).toEqual([4.23, 0, 0]);
+    expect(made.store.state.draft.amount).toMatchObject({ fraction: 0.47, whole: { by: [9, 0, 0] } });
+    // One that a program gave, with what no form holds, and one that was no more than a part of the way back.
+    orderOf("o2", { edits: [shift(1), shift(2)] }, 0.5);
+    orderOf("o3", { undo: 1 }, null);
+    expect([ways("o2"), ways("o3")]).toEqual([[], []]);
+    orderOf("o4", { stack: [stack[0]!, shift(8, { muted: true }), stack[2]!] }, null);
+    expect(ways("o4")).toEqual(["Edit again"]);
+    press("o4", "again");
+    expect(made.store.state.draft).toMatchObject({ key: "translate", updating: 1 });
+    made.commands.apply();
+    expect((made.orders().at(-1) as { stack: Json[] }).stack).toMatchObject([stack[0]!, shift(8, { muted: true }), stack[2]!]);
   });
 
   it("lets nobody take back what is not there, and no watcher anything, with the reason", () => {

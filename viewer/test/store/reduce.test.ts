@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import type { FieldInformation, ForecastAnswer, Json } from "../../src/connection/protocol";
 import { own } from "../../src/own";
 import { asksNothing, bodyOf, chosen, openBoundariesMoved, wishedOrder, wishedStack, withMove } from "../../src/store/draft";
-import { isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
+import { asFormOrder, isRedoable, provenance, undoable, whyNotEditable } from "../../src/store/edits";
 import { looksOf, readLooks } from "../../src/store/looks";
 import type { Looks } from "../../src/store/looks";
 import { appliedOrders } from "../../src/store/orders";
@@ -98,6 +98,44 @@ describe("the form's state", () => {
     expect(take("rotate", { degrees: 20, axis: [0, 1, 0] }, 0.5)).toMatchObject({ degrees: 10, axis: [0, 1, 0] });
     expect(take("affine", { matrix: [[3, 0, 0], [0, 1, 0], [0, 2, 1]] }, 0.5).matrix).toEqual([[2, 0, 0], [0, 1, 0], [0, 1, 1]]);
     expect(take("skeleton", { moves: [{ at: [1, 1, 1], by: [0, 0, 4] }] }, 0.25).moves).toEqual([{ at: [1, 1, 1], by: [0, 0, 1] }]);
+  });
+});
+
+describe("an order that was refused", () => {
+  const nudge = (x: number): Json => ({ translate: { features: ["wall"], fixed: [], by: [x, 0, 0], harmonic_order: 2, muted: false } });
+
+  it("is what the form composes, for the stack that there is now", () => {
+    const now = [pinch(0.5), nudge(1), nudge(2)];
+    expect(asFormOrder({ edits: [nudge(9)], schedule: { steps: 3 } }, now)).toEqual({ edit: nudge(9), updating: null, settings: { schedule: { steps: 3 } } });
+    expect(asFormOrder({ stack: [pinch(0.5), nudge(9), nudge(2)] }, now)).toEqual({ edit: nudge(9), updating: 1, settings: {} });
+    // Another edit has come behind meanwhile.
+    expect(asFormOrder({ stack: [pinch(0.1)] }, now)).toEqual({ edit: pinch(0.1), updating: 0, settings: {} });
+    expect(asFormOrder({ stack: [...now, nudge(9)] }, now)).toEqual({ edit: nudge(9), updating: null, settings: {} });
+    const others: Json[] = [
+      { undo: 1 }, { edits: [nudge(3), nudge(4)] }, { edits: [] }, { stack: now }, { stack: [] }, { stack: [pinch(0.5), nudge(2)] }, { stack: [pinch(0.5), nudge(2), nudge(1)] },
+      { stack: [pinch(0.1), nudge(9), nudge(2)] }, { stack: [nudge(9), nudge(1), nudge(2)] }, { displacement: { file: "a" } }, null, 3,
+    ];
+    for (const order of others) expect(asFormOrder(order, now), JSON.stringify(order)).toBeNull();
+    expect(asFormOrder(undefined, now)).toBeNull();
+  });
+
+  it("comes back with what it set, and what was to mend it is for it alone", () => {
+    const { store, commands, sent } = composed();
+    const guard = { min_scaled_jacobian: 0.03, otherwise: "untangle" };
+    store.dispatch({ type: "form read", key: "scale_direction", body: { ...bodyOf(store.state.draft) }, settings: { schedule: { steps: 3 } }, problems: [], step: "input steps" });
+    store.dispatch({ type: "remedy", settings: { guard } });
+    commands.apply();
+    const [{ id }] = store.state.orders as unknown as [{ id: string }];
+    const asked = sent.at(-1)!.order;
+    store.dispatch({ type: "order", status: { id, status: "rejected", fraction: 0.5 } });
+    expect(asksNothing(store.state)).toBe(true);
+    store.dispatch({ type: "order taken up", id, fraction: 1 });
+    expect(wishedOrder(store.state)).toEqual(asked);
+    expect(store.state.draft).toMatchObject({ settings: { schedule: { steps: 3 } }, remedy: { guard } });
+    store.dispatch({ type: "step back" });
+    expect([asksNothing(store.state), store.state.draft.remedy]).toEqual([true, {}]);
+    store.dispatch({ type: "order taken up", id: "another", fraction: 1 });
+    expect(asksNothing(store.state)).toBe(true);
   });
 });
 
