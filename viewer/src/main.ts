@@ -1,7 +1,7 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
-import { keepIdentity, knownIdentity } from "./connection/identity";
+import { keepIdentity } from "./connection/identity";
 import { Pipelines } from "./connection/pipelines";
-import type { Frame, Hello, Json, Monitor, ServerMessage, ToldHello, Vector } from "./connection/protocol";
+import type { Frame, Json, Monitor, ServerMessage, ToldHello, Vector } from "./connection/protocol";
 import { SentViews } from "./connection/sent-views";
 import { Stack } from "./connection/stack";
 import { watchDefects } from "./defects";
@@ -63,12 +63,13 @@ import type { Bar } from "./picture/scene";
 import { Checker } from "./pipelines/checker";
 import { Forecasts } from "./preview/forecasts";
 import { Previewer } from "./preview/previewer";
+import { Memory } from "./remember";
 import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
 import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { fieldNamed, fieldsOf, sameFields } from "./store/fields";
-import { Kept, KeptRun, LONGEST_HISTORY } from "./store/kept";
+import { Kept, KeptRun } from "./store/kept";
 import { onlyLook } from "./store/looks";
 import type { Look } from "./store/looks";
 import { NO_PIPELINES, readDrafts } from "./store/pipeline-drafts";
@@ -241,11 +242,9 @@ const compare = new Compare(part("before"), part("compare"), scene, earlier, {
   views: () => store.state.hello?.views ?? [], looks: () => store.state.looks, features: () => store.state.hello?.features ?? [], selection, trouble: report,
 });
 part("compare").addEventListener("click", () => { part("now").hidden = part("before").hidden; });
-const following = new Following(store, commands, scene.camera, ({ parallel }) => {
-  document.querySelector('[data-camera="parallel"]')?.setAttribute("aria-pressed", String(parallel));
-});
+const following = new Following(store, commands, scene.camera, () => cameraTools.show());
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
-new CameraTools(part("tools"), scene);
+const cameraTools = new CameraTools(part("tools"), scene);
 const reveal = watchDrawers();
 const notes: NotesPanel = new NotesPanel(store, commands, marks, {
   flyTo: (place) => scene.camera.flyTo(place),
@@ -404,28 +403,19 @@ function takeFrame(frame: Frame): void {
   if (scene.setData(frame)) store.dispatch({ type: "frame", view: frame.view, cycle: frame.cycle });
 }
 
-/** Whether it is known which run this is: what was kept of it is there again, and can be kept anew. */
-let isRemembered = false;
-function remember({ back }: Hello): void {
-  if (isRemembered) return;
-  isRemembered = true;
-  // Only the run that this page was connected to before knows it by that.
-  if (!back || knownIdentity()?.back !== back) return keptRun.forget();
-  const { pins: known, history: said, isWorstOwn } = keptRun.read();
-  if (said !== null) monitored.restore(said);
-  pins.restore(known);
-  worst.restore(isWorstOwn);
-  history.update();
-  dock.update();
-}
-window.addEventListener("pagehide", () => {
-  worst.leave();
-  if (isRemembered) keptRun.keep({ pins: pins.kept, history: monitored.kept(LONGEST_HISTORY), isWorstOwn: worst.kept });
+const memory = new Memory(store, keptRun, {
+  camera: scene.camera, pins, worst, monitored,
+  restored: () => {
+    cameraTools.show();
+    history.update();
+    dock.update();
+  },
+  whenDrawn: (then) => store.watch((state) => state.frames.count > 0, (isThere) => { if (isThere) void scene.picture().then(then); }),
 });
 
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;
-  remember(hello);
+  memory.greeted(hello);
   connection.identity = { client: String(hello.client), back: hello.back ?? "" };
   keepIdentity(connection.identity);
   scene.setFeatures(hello.features.map((feature) => feature.name));

@@ -9,7 +9,7 @@ export class CameraTools {
   private side: 1 | -1 = 1;
   private looking = "";
 
-  constructor(root: HTMLElement, private readonly scene: Scene) {
+  constructor(private readonly root: HTMLElement, private readonly scene: Scene) {
     // What is said over the picture stands below the buttons, however many rows they take.
     new ResizeObserver(() => document.body.style.setProperty("--tools-height", `${root.offsetHeight}px`)).observe(root);
     root.addEventListener("click", (event) => {
@@ -18,9 +18,14 @@ export class CameraTools {
       if (!button || !camera) return;
       if (camera === "parallel") {
         this.scene.camera.parallel = !this.scene.camera.parallel;
-        button.setAttribute("aria-pressed", String(this.scene.camera.parallel));
+        this.show();
       } else this.look(camera);
     });
+  }
+
+  /** Shows how the camera is, which something else has changed. */
+  show(): void {
+    this.root.querySelector('[data-camera="parallel"]')?.setAttribute("aria-pressed", String(this.scene.camera.parallel));
   }
 
   private look(camera: string): void {

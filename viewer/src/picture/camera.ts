@@ -31,12 +31,19 @@ export class Camera {
   ) {}
 
   private place(): string {
-    return JSON.stringify(this.renderer.getActiveCamera().getPosition());
+    const camera = this.renderer.getActiveCamera();
+    // A key zooms by the angle of view, and in parallel projection by the scale: the position stays.
+    return JSON.stringify([camera.getPosition(), camera.getViewAngle(), camera.getParallelScale()]);
   }
 
   /** The picture has another size: as much of it as there is room for, where nobody has moved the camera since `reset`. */
   refit(): void {
-    if (this.whole === this.place()) this.reset();
+    if (this.isWhole) this.reset();
+  }
+
+  /** Whether it shows the whole: nobody has moved it since `reset`. */
+  get isWhole(): boolean {
+    return this.whole === this.place();
   }
 
   get stand(): Stand {

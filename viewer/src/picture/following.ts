@@ -87,7 +87,7 @@ function standOf({ position, focal_point: focalPoint, view_up: viewUp, parallel,
 }
 
 /** Whether a camera looks from one place at another, with numbers alone. */
-function isSound({ position, focalPoint, viewUp, parallelScale, viewAngle }: Stand): boolean {
+export function isSound({ position, focalPoint, viewUp, parallelScale, viewAngle }: Stand): boolean {
   const vectors = [position, focalPoint, viewUp];
   return vectors.every((vector) => Array.isArray(vector) && vector.length === 3 && vector.every(Number.isFinite))
     && !sameJson(position, focalPoint) && viewUp.some((part) => part !== 0)

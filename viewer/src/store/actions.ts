@@ -3,6 +3,7 @@ import type { ConnectionState } from "../connection/connection";
 import type { FieldInformation, ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, PipelineChange, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { LanguageError } from "../kernel/language";
+import type { KeptDraft } from "./kept-draft";
 import type { Look } from "./looks";
 import type { AskedChange } from "./pipeline-drafts";
 import type { Pipeline } from "./pipelines";
@@ -56,6 +57,8 @@ export type Action =
   // The features.
   | { type: "part"; feature: string; part: Part | null }
   | { type: "hover"; feature: string | null }
+  /** The page was loaded again: what it showed, and what stood in the form. */
+  | { type: "remembered"; chosenView: string | null; draft: KeptDraft | null }
   // The form. `step` names the field or gesture: all that it does is one step to take back.
   | { type: "form read"; key: string; body: Values; settings: Values; problems: readonly Problem[]; step: string }
   | { type: "action chosen"; key: string }

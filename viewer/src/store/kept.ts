@@ -1,12 +1,16 @@
 /**
  * What the page keeps over a reload: the theme, whether the tour was seen, the person's name; and for each run of a relay by itself how views
- * look, and the dock. Of the run itself only pins, what monitors have said and whether
- * this page has had the worst cells shown, no longer than the session; no secret.
+ * look, and the dock. Of the run itself only pins, what monitors have said, whether this page has had the worst cells shown, how the page
+ * stands and what stands in its form, no longer than the session; no secret.
  */
 import type { Theme } from "../picture/theme";
 import type { Vector } from "../connection/protocol";
+import type { Stand } from "../picture/camera";
+import { isSound } from "../picture/following";
 import { PINS } from "../picture/pins";
 import type { KeptPin } from "../picture/pins";
+import { readDraft } from "./kept-draft";
+import type { KeptDraft } from "./kept-draft";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
 
@@ -71,8 +75,18 @@ export class Kept {
   }
 }
 
-/** What is kept of a run: the pins, what monitors have said, null for nothing, and whether the pipeline of the worst cells is of this page. */
-export interface KeptOfRun { pins: readonly KeptPin[]; history: string | null; isWorstOwn: boolean }
+/**
+ * What is kept of a run: the pins, what monitors have said, null for nothing, and whether the pipeline of the worst cells is of this page;
+ * how the page stood, and what stood in its form.
+ */
+export interface KeptOfRun {
+  pins: readonly KeptPin[]; history: string | null; isWorstOwn: boolean;
+  /** Where somebody has put the camera; null where it shows the whole. */
+  camera: Stand | null;
+  isParallel: boolean; isSkeletonShown: boolean; isCompared: boolean;
+  chosenView: string | null;
+  draft: KeptDraft | null;
+}
 
 /** The most characters of what monitors have said. */
 export const LONGEST_HISTORY = 300_000;
@@ -99,10 +113,12 @@ export class KeptRun {
 
   read(): KeptOfRun {
     // A text in a text is longer than it is: its quotes are escaped.
-    const { pins, history, isWorstOwn } = read(this.storage, this.key, 2 * LONGEST_HISTORY + LONGEST);
+    const { pins, history, isWorstOwn, camera, isParallel, isSkeletonShown, isCompared, chosenView, draft } = read(this.storage, this.key, 2 * LONGEST_HISTORY + 2 * LONGEST);
     return {
       pins: Array.isArray(pins) ? pins.filter(isPin).slice(0, PINS) : [], history: typeof history === "string" ? history : null,
-      isWorstOwn: isWorstOwn === true,
+      isWorstOwn: isWorstOwn === true, camera: isStand(camera) ? camera : null, isParallel: isParallel === true,
+      isSkeletonShown: isSkeletonShown === true, isCompared: isCompared === true,
+      chosenView: typeof chosenView === "string" ? chosenView : null, draft: readDraft(draft),
     };
   }
 
@@ -116,6 +132,12 @@ function isPin(value: unknown): value is KeptPin {
   const { name, view, point } = (typeof value === "object" && value !== null ? value : {}) as Partial<Record<keyof KeptPin, unknown>>;
   const isPoint = Array.isArray(point) && point.length === 3 && (point as Vector).every(Number.isFinite);
   return typeof name === "string" && /^probe \d{1,9}$/.test(name) && typeof view === "string" && isPoint;
+}
+
+function isStand(value: unknown): value is Stand {
+  if (typeof value !== "object" || value === null) return false;
+  const { middle, parallel } = value as Partial<Stand>;
+  return isSound(value as Stand) && typeof parallel === "boolean" && (middle === undefined || (Array.isArray(middle) && middle.length === 2 && middle.every(Number.isFinite)));
 }
 
 /** Rubbish, or what another version has written, counts as nothing. */

@@ -7,6 +7,7 @@ import { own } from "../own";
 import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { asFormOrder } from "./edits";
+import { canTakeUp, draftOf, saysSomething, whyNotFitting } from "./kept-draft";
 import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { pipelinesAfter } from "./pipeline-drafts";
@@ -27,7 +28,7 @@ const NOBODY: Pick<State, "people" | "followedBy" | "following"> = { people: [],
 
 export function reduce(state: State, action: Action): State {
   const before = wishedOrder(state);
-  const next = after(state, action);
+  const next = withKeptDraft(after(state, action));
   // What was told of one order says nothing of another.
   return next.forecast !== NO_FORECAST && !sameJson(wishedOrder(next), before) ? { ...next, forecast: NO_FORECAST } : next;
 }
@@ -85,6 +86,10 @@ function after(state: State, action: Action): State {
     case "look": {
       const views = action.view === null ? (state.hello?.views ?? []).map(({ name }) => name) : [action.view];
       return { ...state, looks: withLook(state.looks, views, action.look) };
+    }
+    case "remembered": {
+      const isThere = state.hello?.views.some(({ name }) => name === action.chosenView);
+      return { ...state, keptDraft: action.draft, chosenView: isThere ? action.chosenView : state.chosenView };
     }
     case "view chosen": return { ...state, chosenView: action.view };
     case "part": {
@@ -287,6 +292,20 @@ function withOrderTakenUp(state: State, id: string, fraction: number): State {
   };
   const taken = { ...stepped({ ...state, refusal: "" }, next, `order ${id}`), selection: { ...state.selection, parts: held.parts } };
   return fraction < 1 ? withAmount(taken, fraction) : taken;
+}
+
+/** What was kept of the form, once it can be taken up; what has been composed meanwhile counts more. */
+function withKeptDraft(state: State): State {
+  const kept = state.keptDraft;
+  if (!kept || !canTakeUp(state)) return state;
+  const without = { ...state, keptDraft: null };
+  if (saysSomething(state) || (kept.key !== null && kindOf(state, kept.key) === null)) return without;
+  const why = whyNotFitting(state, kept);
+  const draft = draftOf(without, kept);
+  const next = { ...without, draft, selection: { ...state.selection, parts: kept.parts } };
+  if (!saysSomething(next)) return why === "" ? next : without;
+  if (why !== "") return { ...without, refusal: `What stood in the form before the page was loaded again is gone: ${why}.` };
+  return { ...stepped(without, draft, "kept"), selection: next.selection };
 }
 
 function withAmount(state: State, fraction: number): State {

@@ -2,6 +2,7 @@
 import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
+import type { KeptDraft } from "./kept-draft";
 import type { Carried, Looks } from "./looks";
 import { NO_PIPELINES } from "./pipeline-drafts";
 import type { PipelinesState } from "./pipeline-drafts";
@@ -91,6 +92,8 @@ export interface State {
   /** The form for an order; null before the schema has come. */
   form: OrderForm | null;
   draft: Draft;
+  /** What stood in the form before the page was loaded again, until the run has told all that it can be of; null for nothing. */
+  keptDraft: KeptDraft | null;
   /** Orders by the time they became known. */
   orders: readonly OrderRecord[];
   /** Stacks that an undo has left, the newest last. */
@@ -126,6 +129,7 @@ export const INITIAL: State = {
   selection: { parts: {}, hovered: null },
   form: null,
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
+  keptDraft: null,
   orders: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
   askedBy: null, people: [], followedBy: 0, following: false, notes: [], pipelines: NO_PIPELINES, refusal: "", errors: [],
