@@ -26,7 +26,9 @@ export class EditsPanel {
   private readonly pending = part("pending");
   private readonly history = part("orders");
   /** The row that is being dragged, and the one whose name is being typed. */
-  private dragged: number | null = null;
+  private drag: { from: number; over: number | null; end: (to: number | null) => void } | null = null;
+  /** The edit that was moved last, from where and to where: the focus goes with it. */
+  private moved: { edit: Json; from: number; to: number } | null = null;
   private renaming: number | null = null;
   private announced = new Map<string, OrderPhase>();
 
@@ -46,12 +48,15 @@ export class EditsPanel {
   }
 
   private show(): void {
+    // A row that is not there as it was is dragged no more.
+    if (this.drag && whyNotEditable(this.store.state) !== "") this.drag.end(null);
     const focus = this.focused();
     const { state } = this.store;
     const by = provenance(state.orders, this.stack);
     // While a name is being typed the list stays: a field that is taken away would end the typing half-way.
     const isTyping = this.renaming !== null && this.list.contains(textField(document.activeElement));
     if (!isTyping) this.list.replaceChildren(...this.stack.map((edit, i) => this.row(edit, i, by[i] ?? null)));
+    this.markDrag();
     part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
     this.pending.replaceChildren(...state.orders.filter(isPending).map((order) => this.pendingRow(order)),
       ...state.orders.filter((order) => isRefused(order) && !order.dismissed).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
@@ -67,8 +72,11 @@ export class EditsPanel {
     const row = active?.closest<HTMLElement>("[data-edit]");
     if (!active || !row || !this.list.contains(active)) return null;
     const act = active.dataset.act ?? "load";
-    const last = Math.max(0, Math.min(Number(row.dataset.edit), this.stack.length - 1));
-    return { exact: `[data-edit="${row.dataset.edit}"] [data-act="${act}"]`, near: `[data-edit="${last}"] [data-act="${act}"]` };
+    const { moved } = this;
+    const index = moved?.from === Number(row.dataset.edit) && sameJson(this.stack[moved.to], moved.edit) ? moved.to : Number(row.dataset.edit);
+    if (index === moved?.to) this.moved = null;
+    const last = Math.max(0, Math.min(index, this.stack.length - 1));
+    return { exact: `[data-edit="${index}"] [data-act="${act}"]`, near: `[data-edit="${last}"] [data-act="${act}"]` };
   }
 
   private row(edit: Json, index: number, order: OrderRecord | null): HTMLElement {
@@ -85,10 +93,13 @@ export class EditsPanel {
       onclick: () => this.store.dispatch({ type: "edit loaded", index }),
       onkeydown: (event) => this.key(event as KeyboardEvent, index),
     }, element("span", { class: "title" }, title), element("span", { class: "detail" }, muted ? "muted" : order ? outcomeOf(order) : ""));
-    const row = element("li", {
+    return element("li", {
       "data-edit": index, "data-muted": String(muted), "data-updating": String(state.draft.updating === index), "data-status": order?.not_followed ? "rejected" : "applied",
-      draggable: why === "" && this.renaming === null ? "true" : "false",
-    }, element("span", { class: "grip", "aria-hidden": "true", title: "Drag to reorder; Alt with the arrow keys does the same" }, "⠿"),
+    }, element("button", {
+      type: "button", class: "grip", tabindex: -1, "data-act": "move", title: why || "Drag to reorder; with the focus on the row, Alt with the arrow keys does the same",
+      "aria-label": `Move: ${title}`, "aria-disabled": why !== "" ? "true" : "false", onpointerdown: (event) => this.take(event as PointerEvent, index),
+      onkeydown: (event) => this.key(event as KeyboardEvent, index),
+    }, "⠿"),
       element("span", { class: "number", "aria-hidden": "true" }, String(index + 1)), text,
       act("mute", muted ? "○" : "●", muted ? "Unmute" : "Mute", () => this.commands.setStack(toggleMute(this.stack, index))),
       act("rename", "✎", "Rename", () => {
@@ -99,8 +110,6 @@ export class EditsPanel {
         input?.select();
       }),
       act("remove", "×", "Delete", () => this.commands.setStack(remove(this.stack, index))));
-    this.watchDrag(row, index);
-    return row;
   }
 
   private nameInput(edit: Json, index: number): HTMLElement {
@@ -137,7 +146,8 @@ export class EditsPanel {
   }
 
   private key(event: KeyboardEvent, index: number): void {
-    const to = event.altKey && event.key === "ArrowUp" ? index - 1 : event.altKey && event.key === "ArrowDown" ? index + 1 : null;
+    const isMeant = event.altKey || (event.currentTarget as HTMLElement).dataset.act === "move";
+    const to = isMeant && event.key === "ArrowUp" ? index - 1 : isMeant && event.key === "ArrowDown" ? index + 1 : null;
     if (to === null) return;
     event.preventDefault();
     this.reorder(index, to);
@@ -145,28 +155,50 @@ export class EditsPanel {
 
   private reorder(from: number, to: number): void {
     if (from === to || to < 0 || to >= this.stack.length || whyNotEditable(this.store.state) !== "") return;
+    this.moved = { edit: this.stack[from]!, from, to };
     this.commands.setStack(move(this.stack, from, to));
   }
 
-  private watchDrag(row: HTMLElement, index: number): void {
-    row.addEventListener("dragstart", (event) => {
-      this.dragged = index;
-      event.dataTransfer?.setData("text/plain", String(index));
-    });
-    row.addEventListener("dragover", (event) => {
-      if (this.dragged === null) return;
-      event.preventDefault();
-      row.classList.add("over");
-    });
-    row.addEventListener("dragleave", () => row.classList.remove("over"));
-    row.addEventListener("dragend", () => { this.dragged = null; });
-    row.addEventListener("drop", (event) => {
-      event.preventDefault();
-      row.classList.remove("over");
-      const from = this.dragged;
-      this.dragged = null;
-      if (from !== null) this.reorder(from, index);
-    });
+  /** Begins to drag a row by its grip: with a mouse, a finger or a pen alike. */
+  private take(event: PointerEvent, from: number): void {
+    if (event.button !== 0 || this.drag || whyNotEditable(this.store.state) !== "") return;
+    // So that no text is marked on the way; and the focus goes with the row.
+    event.preventDefault();
+    (event.currentTarget as HTMLElement).focus();
+    const { pointerId } = event;
+    // What changes meanwhile makes the rows anew: it is the page that follows the pointer.
+    const heard = new AbortController();
+    const { signal } = heard;
+    const end = (to: number | null): void => {
+      heard.abort();
+      this.drag = null;
+      this.markDrag();
+      if (to !== null) this.reorder(from, to);
+    };
+    this.drag = { from, over: null, end };
+    window.addEventListener("pointermove", (moved) => {
+      if (moved.pointerId !== pointerId || !this.drag) return;
+      const row = document.elementFromPoint(moved.clientX, moved.clientY)?.closest<HTMLElement>("#stack [data-edit]");
+      this.drag.over = row ? Number(row.dataset.edit) : null;
+      this.markDrag();
+    }, { signal });
+    window.addEventListener("pointerup", (up) => { if (up.pointerId === pointerId) end(this.drag?.over ?? null); }, { signal });
+    window.addEventListener("pointercancel", (gone) => { if (gone.pointerId === pointerId) end(null); }, { signal });
+    window.addEventListener("keydown", (key) => {
+      if (key.key !== "Escape") return;
+      key.preventDefault();
+      key.stopPropagation();
+      end(null);
+    }, { signal, capture: true });
+    this.markDrag();
+  }
+
+  private markDrag(): void {
+    for (const row of this.list.querySelectorAll<HTMLElement>("[data-edit]")) {
+      const index = Number(row.dataset.edit);
+      row.classList.toggle("dragged", index === this.drag?.from);
+      row.classList.toggle("over", index === this.drag?.over && index !== this.drag.from);
+    }
   }
 
   private pendingRow(order: OrderRecord): HTMLElement {

@@ -24,16 +24,14 @@ export function draftToKeep(state: State): KeptDraft | null {
 
 /** What was kept, where it can be that. */
 export function readDraft(kept: unknown): KeptDraft | null {
-  if (!isRecord(kept)) return null;
+  if (!isObject(kept)) return null;
   const { key, body, settings, remedy, updating, amount, before, parts } = kept;
-  const isAmount = amount === null || (isRecord(amount) && isRecord(amount.whole) && typeof amount.fraction === "number" && amount.fraction >= 0 && amount.fraction <= 1);
-  const isSound = (key === null || typeof key === "string") && isRecord(body) && isRecord(settings) && isRecord(remedy) && isAmount
+  const isAmount = amount === null || (isObject(amount) && isObject(amount.whole) && typeof amount.fraction === "number" && amount.fraction >= 0 && amount.fraction <= 1);
+  const isSound = (key === null || typeof key === "string") && isObject(body) && isObject(settings) && isObject(remedy) && isAmount
     && (updating === null || (Number.isInteger(updating) && (updating as number) >= 0)) && before !== undefined
-    && isRecord(parts) && Object.values(parts).every((part) => part === "handle" || part === "fixed");
-  return isSound ? { key, body, settings, remedy, updating, amount, before, parts } as KeptDraft : null;
+    && isObject(parts) && Object.values(parts).every((part) => part === "handle" || part === "fixed");
+  return isSound ? { key, body, settings, remedy, updating, amount, before, parts } as unknown as KeptDraft : null;
 }
-
-const isRecord = (value: unknown): value is { readonly [key: string]: unknown } => isObject(value as Json);
 
 /** Whether the run has told all that a draft can be of: its features, its edits and its form. */
 export const canTakeUp = ({ form, hello }: State): boolean => form !== null && hello !== null && hello.isAwaitingEdits !== true;

@@ -57,6 +57,72 @@ describe("the list of edits", () => {
     expect(document.activeElement).toBe(button(1, "remove"));
   });
 
+  describe("are put in another sequence", () => {
+    const at = (kind: string, row: number | null, on: EventTarget = window, pointerId = 1): void => {
+      document.elementFromPoint = () => (row === null ? null : document.querySelector(`#stack [data-edit="${row}"] .title`));
+      on.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, button: 0, pointerId, pointerType: "touch" }));
+    };
+    const marked = (name: string): (string | undefined)[] => [...document.querySelectorAll<HTMLElement>(`#stack .${name}`)].map((row) => row.dataset.edit);
+    const others = [stack[1]!, stack[2]!, stack[0]!];
+    /** The order was carried out, and its stack has come. */
+    const done = (edits: Json[]): void => {
+      made.store.dispatch({ type: "order", status: { id: made.store.state.orders.at(-1)!.id, status: "applied" } });
+      made.store.dispatch({ type: "stack", edits, undoable: 1 });
+    };
+
+    it("by a finger, a pen or a mouse on the grip, also where the rows are made anew on the way, and the focus goes along", () => {
+      at("pointerdown", 0, button(0, "move"));
+      at("pointermove", 1);
+      expect([marked("dragged"), marked("over")]).toEqual([["0"], ["1"]]);
+      made.store.dispatch({ type: "order", status: { id: "o1", status: "applying", shape: 1, shapes: 10, order: { edits: [shift(3)] } } });
+      expect([marked("dragged"), marked("over")]).toEqual([["0"], ["1"]]);
+      at("pointermove", 2, window, 2);
+      at("pointerup", 2, window, 2);
+      expect(made.orders()).toEqual([]);
+      at("pointermove", 2);
+      at("pointerup", 2);
+      expect([marked("dragged"), marked("over")]).toEqual([[], []]);
+      expect(made.orders()).toEqual([{ stack: others }]);
+      done(others);
+      expect(document.activeElement).toBe(button(2, "move"));
+    });
+
+    it("by nothing that ends elsewhere, is given up, or may not change them", () => {
+      const drag = (end: () => void): void => {
+        at("pointerdown", 0, button(0, "move"));
+        at("pointermove", 2);
+        end();
+        at("pointerup", 2);
+      };
+      drag(() => at("pointermove", null));
+      at("pointerup", null);
+      drag(() => at("pointercancel", 2));
+      drag(() => window.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" })));
+      drag(() => made.store.dispatch({ type: "stack awaited", undoable: 4 }));
+      drag(() => undefined);
+      expect(made.orders()).toEqual([]);
+    });
+
+    it("by arrows on the grip, or with Alt on the row, and the focus goes along", () => {
+      const press = (on: HTMLElement, more: KeyboardEventInit = {}): void => {
+        on.focus();
+        on.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowDown", ...more }));
+      };
+      press(button(0, "load"));
+      expect(made.orders()).toEqual([]);
+      press(button(0, "load"), { altKey: true });
+      done([stack[1]!, stack[0]!, stack[2]!]);
+      expect(document.activeElement).toBe(button(1, "load"));
+      press(button(1, "move"));
+      expect(made.orders().at(-1)).toEqual({ stack: others });
+      done(others);
+      expect(document.activeElement).toBe(button(2, "move"));
+      // What another has changed leaves the focus where it is.
+      made.store.dispatch({ type: "stack", edits: [...others, shift(4)], undoable: 1 });
+      expect(document.activeElement).toBe(button(2, "move"));
+    });
+  });
+
   it("gives a name with Enter, and none with Escape", () => {
     const type = (text: string, key: string): void => {
       button(2, "rename").click();
