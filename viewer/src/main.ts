@@ -56,6 +56,7 @@ import { Earlier } from "./picture/earlier";
 import type { Content } from "./picture/earlier";
 import { Movie } from "./picture/movie";
 import { SliceHandle } from "./picture/slice-handle";
+import { withTyped } from "./picture/ranges";
 import { Ruler } from "./picture/ruler";
 import { paint, save, withBars } from "./picture/screenshot";
 import { Scene } from "./picture/scene";
@@ -139,10 +140,10 @@ const unitOf = (field: string | null): string | null => fieldNamed(store.state, 
 /** A field and its component in words, with its unit. */
 const titleWithUnit = (field: string | null, component: number): string => withUnit(fieldTitle(field, component), unitOf(field));
 let shownBars: Bar[] = [];
-const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }) => ({ title: fieldTitle(field, component, views[0]), unit: unitOf(field) }), (names, [low, high]) => {
+const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }) => ({ title: fieldTitle(field, component, views[0]), unit: unitOf(field) }), (names, range) => {
   for (const view of names) {
     const look = own(store.state.looks, view);
-    if (look) store.dispatch({ type: "look", view, look: { range: { ...look.range, kind: "fixed", low, high } } });
+    if (look) store.dispatch({ type: "look", view, look: { range: withTyped(look.range, range) } });
   }
 });
 /** Whether the browser has taken away what draws the picture. */

@@ -4,7 +4,7 @@ import { exactCell } from "../exact";
 import { readNumber, whyNoNumber, words } from "../number";
 import { own } from "../own";
 import { COLOUR_MAPS, componentNames, gradient, colourMap } from "../picture/colour";
-import { textIn } from "../picture/ranges";
+import { about0, textIn, whyNoEnds, withTyped } from "../picture/ranges";
 import type { Range, RangeChoice, RangeKind } from "../picture/ranges";
 import type { Bar } from "../picture/scene";
 import type { Action } from "../store/actions";
@@ -34,12 +34,15 @@ export class LookPanel {
   private readonly high = this.end("highest value");
   private readonly ends = [this.low, this.high].map((input) => [input, exactCell(input)] as const);
   private readonly unit = element("span", { class: "unit" });
-  private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.changeRange({ symmetric: this.symmetric.checked, logarithmic: false }) });
+  private readonly symmetric = element("input", { type: "checkbox", onchange: () => this.centre(this.symmetric.checked) });
   private readonly logarithmic = element("input", { type: "checkbox", onchange: () => this.changeRange({ logarithmic: this.logarithmic.checked, symmetric: false }) });
   private readonly edges = element("select", { onchange: () => this.change({ edges: this.edges.value as Look["edges"] }) }, ...EDGES.map((edges) => option(edges, edges === "none" ? "none" : `of ${edges === "mesh" ? "the mesh" : "features"}`)));
   private readonly rows: HTMLElement;
   private readonly quality = element("button", { type: "button", class: "small", title: "Has the quality of the cells streamed with this view", onclick: () => this.byQuality() }, "Colour by mesh quality");
+  private readonly problem = element("p", { class: "wrong", role: "alert", hidden: true });
   private shown: Range | null = null;
+  /** The look for which something was typed that is no range: it stays there, to be mended, until the look is another one. */
+  private wrongIn: Look | null = null;
 
   /** `measure` has the quality of its cells streamed with a view. */
   constructor(root: HTMLElement, private readonly store: Store<State, Action>, private readonly measure: (view: string) => void) {
@@ -51,7 +54,7 @@ export class LookPanel {
     component.id = "component-row";
     this.rows = element("div", {}, row("field", this.field), component,
       element("div", { class: "coloured" }, row("colours", this.map), this.sample, row("range", this.kind),
-        element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high, this.unit),
+        element("div", { class: "range" }, this.low, element("span", { "aria-hidden": "true" }, "to"), this.high, this.unit), this.problem,
         element("div", { class: "checks" }, element("label", {}, this.symmetric, "about 0"), element("label", {}, this.logarithmic, "logarithmic"))),
       row("edges", this.edges),
       element("button", { type: "button", class: "small", title: "Colour every view like this one", onclick: () => this.spread() }, "Use for all views"), this.quality);
@@ -108,10 +111,31 @@ export class LookPanel {
 
   /** A number typed at either end fixes the range. */
   private typed(): void {
-    const [low, high] = this.ends.map(([input, cell]) => cell.untouched() ?? readNumber(input.value)) as [number | null, number | null];
-    markWrong(this.low, low === null ? whyNoNumber(this.low.value) : "");
-    markWrong(this.high, high === null ? whyNoNumber(this.high.value) : low !== null && high <= low ? "must be more than the lowest value" : "");
-    if (low !== null && high !== null && low < high) this.changeRange({ kind: "fixed", low, high });
+    // An end that is left empty is as it was.
+    const [low, high] = this.ends.map(([input, cell], i) => cell.untouched() ?? (input.value.trim() === "" ? this.range?.[i] ?? null : readNumber(input.value))) as [number | null, number | null];
+    const { look } = this;
+    const wrong = low === null || high === null
+      ? [low, high].map((value, i) => (value === null ? whyNoNumber(this.ends[i]![0].value) : ""))
+      : whyNoEnds([low, high], look?.range.logarithmic === true);
+    this.wrongIn = wrong.some((why) => why !== "") ? look : null;
+    this.say(wrong);
+    if (look && low !== null && high !== null && !this.wrongIn) this.change({ range: withTyped(look.range, [low, high]) });
+  }
+
+  /** Says what is wrong with the ends of the range; empty for nothing. */
+  private say(wrong: readonly string[]): void {
+    this.ends.forEach(([input], i) => markWrong(input, wrong[i] ?? ""));
+    const text = wrong.flatMap((why, i) => (why === "" ? [] : [`${i === 0 ? "Lowest" : "Highest"} value: ${why}.`])).join(" ");
+    write(this.problem, text);
+    this.problem.hidden = text === "";
+  }
+
+  /** Has the range lie about 0, or no more: a fixed one is then another, as its ends say. */
+  private centre(symmetric: boolean): void {
+    const { look } = this;
+    if (!look) return;
+    const [low, high] = symmetric && look.range.kind === "fixed" ? about0([look.range.low, look.range.high]) : [look.range.low, look.range.high];
+    this.changeRange({ low, high, symmetric, logarithmic: false });
   }
 
   private show(): void {
@@ -143,15 +167,24 @@ export class LookPanel {
     this.showEnds();
   }
 
+  /** What the ends of the range are now, where that is known. */
+  private get range(): Range | null {
+    const { look } = this;
+    return look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
+  }
+
   private showEnds(): void {
     const { look } = this;
-    const range: Range | null = look?.range.kind === "fixed" ? [look.range.low, look.range.high] : this.shown;
+    if (look && look === this.wrongIn) return;
+    this.wrongIn = null;
+    const { range } = this;
     this.ends.forEach(([input, cell], i) => {
       if (document.activeElement === input) return;
       if (range) cell.write(range[i]!, textIn(range[i]!, range, look?.range.logarithmic === true));
       else cell.write(null, "");
-      markWrong(input, "");
     });
+    // What was fixed before it was to be logarithmic may be none of that.
+    this.say(look?.range.kind === "fixed" ? whyNoEnds([look.range.low, look.range.high], look.range.logarithmic) : []);
   }
 }
 

@@ -4,7 +4,7 @@ import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
 import { readNumber, whyNoNumber, words } from "../number";
 import { GREY, NO_NUMBER_TEXT, colourMap, componentNames, gradient } from "./colour";
-import { isOfOneValue, textIn, valueAt } from "./ranges";
+import { isOfOneValue, textIn, valueAt, whyNoEnds } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
 
@@ -15,7 +15,7 @@ const HINT = "Type a number to fix the range";
 export interface BarText { title: string; unit: string | null }
 
 export class ScalarBars {
-  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; gaps: HTMLElement; cells: ExactCell[]; range: Range; typed: (range: Range) => void; name: (text: BarText) => void }>();
+  private readonly shown = new Map<string, { root: HTMLElement; ticks: HTMLElement[]; ends: [HTMLInputElement, HTMLInputElement]; gaps: HTMLElement; cells: ExactCell[]; range: Range; isLogarithmic: boolean; typed: (range: Range) => void; name: (text: BarText) => void }>();
 
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
@@ -35,6 +35,7 @@ export class ScalarBars {
     const shown = this.shown.get(bar.key) ?? this.make(bar);
     const { ticks, ends, cells } = shown;
     shown.range = bar.range;
+    shown.isLogarithmic = bar.look.range.logarithmic;
     shown.typed = (range) => this.fix(bar.views, range);
     shown.name(this.describe(bar));
     shown.gaps.hidden = !bar.hasGaps;
@@ -56,8 +57,9 @@ export class ScalarBars {
         ends.forEach((input, i) => markWrong(input, typed[i] === null ? whyNoNumber(input.value) : "", HINT));
         const [low, high] = typed as [number | null, number | null];
         if (low === null || high === null) return;
-        if (low < high) shown.typed([low, high]);
-        else markWrong(ends[1], "must be more than the lowest value", HINT);
+        const wrong = whyNoEnds([low, high], shown.isLogarithmic);
+        ends.forEach((input, i) => markWrong(input, wrong[i]!, HINT));
+        if (wrong.every((why) => why === "")) shown.typed([low, high]);
       },
     });
     const ends: [HTMLInputElement, HTMLInputElement] = [end(), end()];
@@ -80,7 +82,7 @@ export class ScalarBars {
       write(unit, text.unit ?? "");
       unit.hidden = !text.unit;
     };
-    const shown = { root, ticks, ends, gaps, cells, range: bar.range, name, typed: (_: Range): void => undefined };
+    const shown = { root, ticks, ends, gaps, cells, range: bar.range, isLogarithmic: bar.look.range.logarithmic, name, typed: (_: Range): void => undefined };
     this.shown.set(bar.key, shown);
     return shown;
   }

@@ -11,10 +11,12 @@ export interface Bar { key: string; look: Look; views: string[]; range: Range; h
 export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): Bar[] {
   const groups = new Map<string, { look: Look; members: (Coloured & { layer: Layer })[] }>();
   const remembered = new Set<string>();
+  const names = new Set<string>();
   for (const layer of layers) {
     const { look, name } = layer;
     const memory = JSON.stringify([name, look.field, look.component]);
     remembered.add(memory);
+    names.add(name);
     const now = look.visible || look.range.kind === "over time" ? layer.takeScalars() : null;
     const key = colourKey(look);
     if (key === null) continue;
@@ -25,7 +27,7 @@ export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): 
     }
     const group = groups.get(key) ?? { look, members: [] };
     groups.set(key, group);
-    group.members.push({ key: memory, now, isSeen: look.visible, layer });
+    group.members.push({ view: name, key: memory, now, isSeen: look.visible, layer });
   }
   const bars: Bar[] = [];
   for (const [key, { look, members }] of groups) {
@@ -35,6 +37,6 @@ export function colour(layers: Iterable<Layer>, ranges: Ranges, held: boolean): 
     for (const { layer } of seen) layer.paint(range);
     bars.push({ key, look, range, views: seen.map(({ layer }) => layer.name), hasGaps: seen.some(({ layer }) => layer.hasGaps) });
   }
-  ranges.keep(remembered);
+  ranges.keep(remembered, names);
   return bars;
 }

@@ -1,5 +1,6 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
+import type { RangeChoice } from "../../src/picture/ranges";
 import { LookPanel } from "../../src/panels/look";
 import { fieldNamed, fieldsOf, sameFields } from "../../src/store/fields";
 import { page } from "../page";
@@ -75,6 +76,37 @@ describe("the look of a view", () => {
     expect(type("lowest value", "1")).toMatchObject({ low: 1, high: 70000 });
     made.store.dispatch({ type: "look", view: "cut", look: { range: { kind: "fixed", low: 1.234e-5, high: 1, logarithmic: true, symmetric: false } } });
     expect(texts()).toEqual(["1.23e−5", "1"]);
+  });
+
+  it("keeps an end as it was typed: not about 0 any more, and no number at or below 0 where it is logarithmic", () => {
+    const { store } = made;
+    const range = (): RangeChoice => store.state.looks.cut!.range;
+    const input = (label: string): HTMLInputElement => root().querySelector(`[aria-label="${label} value"]`)!;
+    const type = (label: string, text: string): void => {
+      input(label).value = text;
+      input(label).dispatchEvent(new Event("change"));
+    };
+    const box = (text: string): HTMLInputElement => [...root().querySelectorAll("label")].find(({ textContent }) => textContent === text)!.querySelector("input")!;
+    const problem = (): string => { const shown = root().querySelector<HTMLElement>(".wrong")!; return shown.hidden ? "" : shown.textContent; };
+    const bar = (...ends: [number, number]): void => panel.setBars([{ key: "", look: store.state.looks.cut!, range: ends, views: ["cut"], hasGaps: false }]);
+    bar(-4, 4);
+    box("about 0").click();
+    expect(range()).toMatchObject({ kind: "auto", symmetric: true });
+    type("highest", "3");
+    expect(range()).toEqual({ kind: "fixed", low: -4, high: 3, symmetric: false, logarithmic: false });
+    expect([box("about 0").checked, input("highest").value]).toEqual([false, "3"]);
+    // The ends say what a fixed range about 0 is.
+    box("about 0").click();
+    expect([range(), input("highest").value]).toEqual([{ kind: "fixed", low: -4, high: 4, symmetric: true, logarithmic: false }, "4"]);
+    box("logarithmic").click();
+    expect([problem(), input("lowest").getAttribute("aria-invalid")]).toEqual(["Lowest value: a logarithmic range holds only numbers above 0.", "true"]);
+    type("lowest", "-1");
+    bar(1, 2);
+    expect([range().low, input("lowest").value, input("lowest").getAttribute("aria-invalid")]).toEqual([-4, "-1", "true"]);
+    type("lowest", "1e-9");
+    expect([range(), problem(), input("lowest").getAttribute("aria-invalid")]).toEqual([{ kind: "fixed", low: 1e-9, high: 4, symmetric: false, logarithmic: true }, "", "false"]);
+    type("lowest", "");
+    expect([range().low, problem()]).toEqual([1e-9, ""]);
   });
 
   it("is told only where a frame carries something else", () => {

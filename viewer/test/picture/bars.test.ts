@@ -33,6 +33,19 @@ describe("a scalar bar", () => {
     expect([high.value, high.getAttribute("aria-invalid")]).toEqual(["1", "false"]);
   });
 
+  it("takes no end that a logarithmic range cannot have", () => {
+    bars.show([{ key: "k", look: { ...look, range: { ...look.range, logarithmic: true } }, range: [1, 10], views: ["cut"], hasGaps: false }]);
+    const low = root().querySelector<HTMLInputElement>('[aria-label="p: lowest value"]')!;
+    const type = (text: string): void => {
+      low.value = text;
+      low.dispatchEvent(new Event("change"));
+    };
+    type("0");
+    expect([fixed, low.getAttribute("aria-invalid"), low.title]).toEqual([[], "true", "a logarithmic range holds only numbers above 0"]);
+    type("1e-9");
+    expect([fixed, low.getAttribute("aria-invalid")]).toEqual([[[["cut"], [1e-9, 10]]], "false"]);
+  });
+
   it("has few digits where all values are one", () => {
     show([0.2153846, 0.2153846 * (1 + 1e-6)]);
     expect([...root().querySelectorAll("input")].map(({ value }) => value)).toEqual(["0.2154", "0.2154"]);
