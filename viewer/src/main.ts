@@ -21,6 +21,8 @@ import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
 import { pointed } from "./number";
 import { own } from "./own";
+import { ClickTools, OnePlace } from "./panels/click-tools";
+import type { ClickTool } from "./panels/click-tools";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
@@ -182,24 +184,31 @@ new ResizeObserver(() => {
 const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
 const ruler = new Ruler(marks);
 const line = new Ruler(marks, "line", (from, to) => {
-  sayMeasuring();
   linePlot.take(from, to);
   dock.choose(linePlot);
 });
-function sayMeasuring(): void {
-  part("ruler").setAttribute("aria-pressed", String(ruler.active));
-  part("line").setAttribute("aria-pressed", String(line.active));
+/** Takes what lies at a place of the page into a plot; returns whether that is the model. */
+function pinAt(x: number, y: number): boolean {
+  const probe = scene.probe(x, y);
+  if (probe) pins.add(probe);
+  return probe !== null;
 }
-/** Switches one of the three that take clicks on or off; the others are off. */
-function useTool(one: Ruler | NotesPanel): void {
-  for (const other of [ruler, line]) if (other !== one && other.active) other.toggle();
-  if (notes !== one && notes.choosing) notes.toggle();
-  one.toggle();
-  sayMeasuring();
-}
+/** A tool that takes places of the model. */
+const placing = (button: string, isOn: () => boolean, toggle: () => void, take: (place: Vector) => void): ClickTool => ({
+  button, isOn, toggle, take: (x, y) => {
+    const place = placeAt(x, y);
+    if (place) take(place);
+    return place !== null;
+  },
+});
+const clickTools = new ClickTools([
+  ...([["ruler", ruler], ["line", line]] as const).map(([button, tool]) => placing(button, () => tool.active, () => tool.toggle(), (place) => tool.take(place))),
+  placing("note", () => notes.choosing, () => notes.toggle(), (place) => notes.take(place)),
+  new OnePlace("pin", pinAt),
+]);
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
 const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
-const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => ruler.active || line.active || notes.choosing);
+const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => clickTools.current !== null);
 /** The place of the model under a place of the page, in numbers that a person would write down. */
 function placeAt(x: number, y: number): Vector | null {
   const probe = scene.probe(x, y);
@@ -213,14 +222,7 @@ watchPointer(part("scene"), scene, selection, {
     const reading = probe && scene.read(probe);
     return reading ? readingText(reading, fieldTitle(reading.field, reading.component), unitOf(reading.field)) : "";
   },
-  tool: () => {
-    const tool = notes.choosing ? notes : [ruler, line].find(({ active }) => active);
-    return tool ? (x, y) => {
-      const place = placeAt(x, y);
-      if (place) tool.take(place);
-      return place !== null;
-    } : null;
-  },
+  tool: () => clickTools.taking(),
 });
 
 // What stands around it.
@@ -296,14 +298,9 @@ const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => (
 }, () => sentViews.update());
 const sentViews: SentViews = new SentViews(store, () => pins.views, onlyView, (message) => commands.ask(message));
 watchPictureTools(part("scene"), part("stage"), {
-  pin: (x, y) => {
-    const probe = scene.probe(x, y);
-    if (probe) pins.add(probe);
-  },
+  pin: pinAt,
   unpin: () => pins.clear(),
-  ruler: () => useTool(ruler),
-  line: () => useTool(line),
-  note: () => useTool(notes),
+  use: (button) => clickTools.use(button),
   movie: () => movie.toggle(),
   save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });

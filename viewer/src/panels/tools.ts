@@ -1,5 +1,6 @@
 /** The toolbar over the picture: the camera; and the theme of the page. */
 import { part, textField, write } from "../dom";
+import { showTip } from "../picture/overlay";
 import type { Scene } from "../picture/scene";
 import type { Theme } from "../picture/theme";
 import type { Kept } from "../store/kept";
@@ -64,16 +65,14 @@ export class Theming {
   }
 }
 
+const NOTHING_THERE = "Nothing lies in the middle of the picture: turn or move it there.";
+
 export interface PictureTools {
-  /** Plots the place under a place of the page. */
-  pin(clientX: number, clientY: number): void;
+  /** Plots what lies at a place of the page; returns whether that is the model. */
+  pin(clientX: number, clientY: number): boolean;
   unpin(): void;
-  /** Switches the ruler on or off. */
-  ruler(): void;
-  /** Begins or leaves the choice of the two ends of a line. */
-  line(): void;
-  /** Begins or leaves the choice of the place of a note. */
-  note(): void;
+  /** Switches a tool that takes clicks on or off, by its button. */
+  use(button: "ruler" | "line" | "note"): void;
   save(): void;
   /** Begins a film, or ends it. */
   movie(): void;
@@ -91,18 +90,28 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
     if (document.fullscreenElement) void document.exitFullscreen();
     else void stage.requestFullscreen?.().catch(() => undefined);
   };
-  part("ruler").addEventListener("click", () => tools.ruler());
-  part("line").addEventListener("click", () => tools.line());
-  part("note").addEventListener("click", () => tools.note());
   part("movie").addEventListener("click", () => tools.movie());
   part("screenshot").addEventListener("click", () => tools.save());
   part("full-screen").addEventListener("click", fullScreen);
   part("keys-button").addEventListener("click", () => keys.showModal());
   part("keys-close").addEventListener("click", () => keys.close());
+  /** Without a pointer it is the middle of the picture that is meant, to which the keys bring what one likes. */
+  const pinMiddle = (): void => {
+    const { left, top, width, height } = picture.getBoundingClientRect();
+    const [x, y] = [left + width / 2, top + height / 2];
+    const hasMet = tools.pin(x, y);
+    showTip(hasMet ? null : NOTHING_THERE, x, y);
+    // Said anew each time.
+    write(part("announcer"), "");
+    if (!hasMet) write(part("announcer"), NOTHING_THERE);
+  };
   const actions: Record<string, () => void> = {
-    p: () => { if (pointer) tools.pin(pointer.x, pointer.y); },
+    p: () => {
+      if (pointer) tools.pin(pointer.x, pointer.y);
+      else pinMiddle();
+    },
     P: () => tools.unpin(),
-    m: () => tools.ruler(), l: () => tools.line(), n: () => tools.note(), s: () => tools.save(), f: fullScreen,
+    m: () => tools.use("ruler"), l: () => tools.use("line"), n: () => tools.use("note"), s: () => tools.save(), f: fullScreen,
   };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;

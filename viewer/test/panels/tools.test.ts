@@ -6,14 +6,23 @@ import { openDocument } from "./document";
 describe("the keys of the picture", () => {
   let done: string[];
   let scene: HTMLElement;
+  let isMet: boolean;
+  let pinned: [number, number][];
   const press = (target: Element, key: string): boolean => !target.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
   beforeEach(() => {
     openDocument();
     done = [];
+    pinned = [];
     scene = document.getElementById("scene")!;
     const tool = (name: string) => () => done.push(name);
+    isMet = true;
     watchPictureTools(scene, document.getElementById("stage")!, {
-      pin: tool("pin"), unpin: tool("unpin"), ruler: tool("ruler"), line: tool("line"), note: tool("note"), save: tool("save"), movie: tool("movie"),
+      pin: (x, y) => {
+        done.push("pin");
+        pinned.push([x, y]);
+        return isMet;
+      },
+      unpin: tool("unpin"), use: (button) => done.push(button), save: tool("save"), movie: tool("movie"),
     });
     scene.dispatchEvent(new MouseEvent("pointermove", { bubbles: true, clientX: 5, clientY: 5 }));
   });
@@ -24,6 +33,22 @@ describe("the keys of the picture", () => {
     scene.dispatchEvent(new MouseEvent("pointerleave"));
     press(document.body, "s");
     expect(done).toHaveLength(5);
+  });
+
+  it("pin what lies in the middle of the picture where there is no pointer, and say so where nothing does", () => {
+    scene.getBoundingClientRect = () => new DOMRect(100, 50, 600, 400);
+    press(scene, "p");
+    scene.dispatchEvent(new MouseEvent("pointerleave"));
+    press(scene, "p");
+    expect(pinned).toEqual([[5, 5], [400, 250]]);
+    const tip = document.getElementById("tip")!;
+    expect(tip.hidden).toBe(true);
+    isMet = false;
+    press(scene, "p");
+    expect([tip.hidden, tip.textContent, document.getElementById("announcer")!.textContent]).toEqual([false, ...Array.from({ length: 2 }, () => "Nothing lies in the middle of the picture: turn or move it there.")]);
+    isMet = true;
+    press(scene, "p");
+    expect(tip.hidden).toBe(true);
   });
 
   it("are letters where somebody types, in the editor of pipelines too", () => {

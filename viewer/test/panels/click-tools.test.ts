@@ -1,0 +1,49 @@
+// @vitest-environment jsdom
+import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
+import { ClickTools, OnePlace } from "../../src/panels/click-tools";
+import { openDocument } from "./document";
+
+describe("the tools that take clicks", () => {
+  let tools: ClickTools;
+  let taken: number[];
+  let heard: ReturnType<typeof vi.spyOn>;
+  const pressed = (): string[] => ["ruler", "pin"].filter((id) => document.getElementById(id)!.getAttribute("aria-pressed") === "true");
+  const escape = (from: EventTarget = window): KeyboardEvent => {
+    const event = new KeyboardEvent("keydown", { key: "Escape", bubbles: true, cancelable: true });
+    from.dispatchEvent(event);
+    return event;
+  };
+  beforeEach(() => {
+    openDocument();
+    taken = [];
+    let isMeasuring = false;
+    heard = vi.spyOn(window, "addEventListener");
+    tools = new ClickTools([
+      { button: "ruler", isOn: () => isMeasuring, toggle: () => { isMeasuring = !isMeasuring; }, take: () => true },
+      new OnePlace("pin", (x) => x > 100 && taken.push(x) > 0),
+    ]);
+  });
+  afterEach(() => {
+    for (const [name, listener] of heard.mock.calls as [string, EventListener][]) window.removeEventListener(name, listener);
+    heard.mockRestore();
+  });
+
+  it("are one at a time, by their buttons, and one for a single place waits until it has met one", () => {
+    expect(tools.taking()).toBeNull();
+    document.getElementById("ruler")!.click();
+    expect(pressed()).toEqual(["ruler"]);
+    document.getElementById("pin")!.click();
+    expect(pressed()).toEqual(["pin"]);
+    expect([tools.taking()!(10, 0), pressed()]).toEqual([false, ["pin"]]);
+    expect([tools.taking()!(110, 0), pressed(), taken]).toEqual([true, [], [110]]);
+    expect(tools.taking()).toBeNull();
+  });
+
+  it("are left with Escape, which is then for nothing else; one that somebody types is not for them", () => {
+    expect(escape().defaultPrevented).toBe(false);
+    document.getElementById("pin")!.click();
+    escape(document.getElementById("note-text")!);
+    expect(pressed()).toEqual(["pin"]);
+    expect([escape().defaultPrevented, pressed(), tools.current]).toEqual([true, [], null]);
+  });
+});
