@@ -27,6 +27,7 @@ export class BendTool {
   private readonly degrees = element("input", { type: "text", inputmode: "decimal", autocomplete: "off", value: String(DEGREES), "aria-label": "degrees of the bend", onkeydown: (event) => this.key(event as KeyboardEvent) });
   private readonly plane = element("select", {}, ...Object.keys(PLANES).map((name) => element("option", { value: name }, name)), element("option", { value: OF_THE_PICTURE }, "of the picture"));
   private readonly button = element("button", { type: "button", class: "bend", title: "Bends the branch at this node: one edit, which can be changed before it is applied", onclick: () => this.bend() }, "Bend");
+  private readonly adding = element("button", { type: "button", title: "A press on another node adds it, as with shift: they move together", "aria-pressed": "false", onclick: () => this.adding.setAttribute("aria-pressed", String(!this.several)) }, "Several");
   private readonly bar: HTMLElement;
   private listed = "";
 
@@ -39,8 +40,13 @@ export class BendTool {
     this.plane.id = identifier("bend-plane");
     this.bar = element("div", { class: "face-tools", role: "toolbar", "aria-label": "Bending the skeleton", hidden: true },
       element("label", { for: this.node.id }, "bend at"), this.node, element("label", {}, "by", this.degrees, "°"),
-      element("label", { for: this.plane.id }, "in the plane"), this.plane, this.button);
+      element("label", { for: this.plane.id }, "in the plane"), this.plane, this.button, this.adding);
     tools.append(this.bar);
+  }
+
+  /** Whether a node that is pressed is meant beside those that are already. */
+  get several(): boolean {
+    return this.adding.getAttribute("aria-pressed") === "true";
   }
 
   /** The skeleton, the node that is meant, or neither is another one. */

@@ -51,7 +51,8 @@ const CLICK_DISTANCE = 4;
 const NODE = 6;
 const STARTS: Record<string, PartKind> = { g: "arrow", t: "ring", e: "box" };
 
-interface Press { pointer: number; at: Place; last: Place; withControl: boolean; click: (() => void) | null }
+/** `down` is the event that began it, `nodes` are those of the skeleton that were meant before. */
+interface Press { pointer: number; at: Place; last: Place; withControl: boolean; click: (() => void) | null; down: PointerEvent; nodes: readonly number[] }
 
 let gestures = 0;
 
@@ -64,6 +65,7 @@ export class Handles {
   private gesture: Gesture | null = null;
   /** The pointer that is down; null while a gesture rests and its number can be typed. */
   private press: Press | null = null;
+  private isHandingOver = false;
   private cursor: Place = [0, 0];
   private unit = "";
 
@@ -151,14 +153,19 @@ export class Handles {
 
   private down(event: PointerEvent): void {
     if (this.box.root.contains(event.target as Node)) return;
-    // Another finger has nothing to say while one drags.
+    if (this.isHandingOver) return;
     if (this.press) {
+      if (this.press.click && event.pointerType === "touch" && this.press.down.pointerType === "touch") return this.handOver(this.press);
+      // Another finger has nothing to say while one drags.
       event.stopPropagation();
       return;
     }
     this.finish();
     if (event.button !== 0 || !this.isOnPicture(event) || this.isHeldBack()) return;
+    // A finger beside another one is the camera's, as the first is.
+    if (event.pointerType === "touch" && !event.isPrimary) return;
     const place = this.placeOf(event);
+    const nodes = this.grippable.meantNodes;
     const begun = this.begun(event, place);
     if (!begun) return;
     event.stopPropagation();
@@ -168,9 +175,19 @@ export class Handles {
     this.cursor = place;
     const withControl = event.ctrlKey || event.metaKey;
     // With ctrl nothing but a drag is meant.
-    this.press = { pointer: event.pointerId, at: place, last: place, withControl, click: withControl ? null : begun.click };
+    this.press = { pointer: event.pointerId, at: place, last: place, withControl, click: withControl ? null : begun.click, down: event, nodes };
     this.selection.hovered = null;
     showTip(null, 0, 0);
+  }
+
+  /** A second finger has come before the first has dragged anything: both are meant for the camera, which has not seen the first. */
+  private handOver(press: Press): void {
+    this.press = null;
+    this.close();
+    this.grippable.mean(press.nodes);
+    this.isHandingOver = true;
+    press.down.target?.dispatchEvent(new PointerEvent(press.down.type, press.down));
+    this.isHandingOver = false;
   }
 
   /** Begins what a press at a place is meant for; null where it is meant for the camera. */
@@ -184,7 +201,7 @@ export class Handles {
       const target = this.target();
       return target && this.begin(target, part, place) ? { click: () => this.rest() } : null;
     }
-    const point = this.grippable.grip(place, isOnNode ? NODE : reach + 5, event.shiftKey);
+    const point = this.grippable.grip(place, isOnNode ? NODE : reach + 5, event.shiftKey || this.bending.several);
     if (point) return this.begin(this.grippable, { kind: "free" }, place, point) ? { click: () => this.close() } : null;
     if (event.shiftKey && !control) return null;
     const face = control ? null : this.shape.region.pick(place);

@@ -85,6 +85,16 @@ export class SkeletonTarget implements Target {
     return node ? this.nameOf(node) : null;
   }
 
+  /** Those that are meant, to be meant again later. */
+  get meantNodes(): readonly number[] {
+    return this.meant;
+  }
+
+  mean(nodes: readonly number[]): void {
+    this.meant = [...nodes];
+    this.drawn();
+  }
+
   grip(place: Place, reach: number, isAdded: boolean): Vector | null {
     const found = nearestWithin(this.places, place[0], place[1], reach);
     if (found < 0) return null;

@@ -2,6 +2,7 @@
 import type { Vector } from "../connection/protocol";
 import { closestAlong } from "../handles/projection";
 import type { Projection } from "../handles/projection";
+import { reachOf } from "../handles/gizmo";
 import { svg } from "../handles/overlay";
 import { add, across, AXES, dot, length, normalised, times } from "../handles/vector";
 import { toStep } from "../handles/rounding";
@@ -30,21 +31,24 @@ export class SliceHandle {
   private readonly outline = svg("polygon", { class: "cut" });
   private readonly shaft = svg("line", { class: "shaft" });
   private readonly knob = svg("circle", { class: "knob", r: "7" });
+  /** Around the knob, for fingers: the page's style lets it be gripped where there are any. */
+  private readonly halo = svg("circle", { class: "halo", r: String(reachOf("touch")) });
+  private readonly grip = svg("g", { class: "grip" });
   private readonly title = svg("title");
   private drag: { pointer: number; plane: Plane; from: number; start: number; offset: number } | null = null;
 
   constructor(root: SVGElement, private readonly scene: HTMLElement, private readonly picture: SlicePicture, private readonly slice: Sliced) {
     this.title.textContent = "Drag the slice along its normal";
-    this.knob.append(this.title);
-    root.append(this.outline, this.shaft, this.knob);
-    this.knob.addEventListener("pointerdown", (event) => this.down(event));
-    this.knob.addEventListener("pointermove", (event) => this.move(event));
-    for (const kind of ["pointerup", "pointercancel"] as const) this.knob.addEventListener(kind, (event) => this.up(event));
+    this.grip.append(this.title, this.halo, this.knob);
+    root.append(this.outline, this.shaft, this.grip);
+    this.grip.addEventListener("pointerdown", (event) => this.down(event));
+    this.grip.addEventListener("pointermove", (event) => this.move(event));
+    for (const kind of ["pointerup", "pointercancel"] as const) this.grip.addEventListener(kind, (event) => this.up(event));
   }
 
   /** The place of the page at which it can be gripped; null where there is none. */
   get place(): [number, number] | null {
-    if (this.knob.style.display === "none") return null;
+    if (this.grip.style.display === "none") return null;
     const { left, top } = this.scene.getBoundingClientRect();
     return [left + Number(this.knob.getAttribute("cx")), top + Number(this.knob.getAttribute("cy"))];
   }
@@ -65,16 +69,15 @@ export class SliceHandle {
     const pixel = projection && point ? projection.pixel(point) : NaN;
     const tip = projection && point && normal && pixel > 0 ? projection.toPicture(add(point, times(normal, ARROW * pixel))) : null;
     const isSeen = corners.length > 2 && corners.every((corner) => corner !== null) && tip !== null && from !== null;
-    for (const shape of [this.outline, this.shaft, this.knob]) shape.style.display = isSeen ? "" : "none";
+    for (const shape of [this.outline, this.shaft, this.grip]) shape.style.display = isSeen ? "" : "none";
     this.outline.classList.toggle("dragged", this.drag !== null);
     if (!isSeen) return;
     // Seen along its normal there is nothing to drag along.
     const isShort = Math.hypot(tip[0] - from[0], tip[1] - from[1]) < 10;
-    this.knob.style.display = this.shaft.style.display = isShort && !this.drag ? "none" : "";
+    this.grip.style.display = this.shaft.style.display = isShort && !this.drag ? "none" : "";
     this.outline.setAttribute("points", corners.map((corner) => corner.map((part) => part.toFixed(1)).join(",")).join(" "));
     for (const [name, value] of [["x1", from[0]], ["y1", from[1]], ["x2", tip[0]], ["y2", tip[1]]] as const) this.shaft.setAttribute(name, value.toFixed(1));
-    this.knob.setAttribute("cx", tip[0].toFixed(1));
-    this.knob.setAttribute("cy", tip[1].toFixed(1));
+    for (const circle of [this.halo, this.knob]) for (const [name, value] of [["cx", tip[0]], ["cy", tip[1]]] as const) circle.setAttribute(name, value.toFixed(1));
   }
 
   /** How far along the normal the pointer is, in units of the mesh. */
@@ -90,7 +93,7 @@ export class SliceHandle {
     if (start === null) return;
     event.preventDefault();
     event.stopPropagation();
-    this.knob.setPointerCapture(event.pointerId);
+    this.grip.setPointerCapture(event.pointerId);
     const from = offsetOf(plane);
     this.drag = { pointer: event.pointerId, plane, from, start, offset: from };
   }

@@ -1,7 +1,11 @@
-import { describe, expect, it } from "vitest";
+// @vitest-environment jsdom
+import { describe, expect, it, vi } from "vitest";
 import type { Vector } from "../../src/connection/protocol";
 import { add, dot, length, normalised, times } from "../../src/handles/vector";
-import { outlineOf } from "../../src/picture/slice-handle";
+import { outlineOf, SliceHandle } from "../../src/picture/slice-handle";
+import { offsetOf } from "../../src/store/pipelines";
+import type { Plane } from "../../src/store/pipelines";
+import { OBLIQUE } from "../handles/cameras";
 
 const BOX: [Vector, Vector] = [[0, 0, 0], [2, 1, 1]];
 
@@ -25,5 +29,30 @@ describe("the outline of a cut", () => {
 
   it("beside the box is none", () => {
     expect(outlineOf(BOX, { origin: [5, 0, 0], normal: [1, 0, 0] }).length).toBeLessThan(3);
+  });
+});
+
+describe("the knob of a slice", () => {
+  it("is gripped by a finger within reach of it, and has the run cut where it is dragged to", () => {
+    const [root, scene] = [document.createElementNS("http://www.w3.org/2000/svg", "svg"), document.createElement("div")];
+    let plane: Plane = { origin: [1, 0.5, 0.2], normal: [0, 0, 2] };
+    const move = vi.fn((to: Plane) => { plane = to; });
+    const handle = new SliceHandle(root, scene, { projection: () => OBLIQUE, points: () => Float32Array.of(0, 0, 0.2, 2, 1, 0.2), bounds: () => BOX, redraw: () => undefined }, { get movable() { return plane; }, move });
+    handle.drawn();
+    const [grip, halo] = [".grip", ".halo"].map((name) => root.querySelector<SVGElement>(name)!) as [SVGElement, SVGElement];
+    expect([Number(halo.getAttribute("r")) >= 16, ["cx", "cy"].map((name) => Number(halo.getAttribute(name)))]).toEqual([true, handle.place]);
+    grip.setPointerCapture = () => undefined;
+    const send = (kind: string, up: number): void => {
+      const [x, y] = [handle.place![0] + 12, handle.place![1] - up];
+      halo.dispatchEvent(new PointerEvent(kind, { bubbles: true, button: 0, pointerId: 3, pointerType: "touch", clientX: x, clientY: y }));
+    };
+    send("pointerdown", 0);
+    send("pointermove", 40);
+    expect(move).toHaveBeenCalledOnce();
+    expect(offsetOf(plane)).toBeGreaterThan(0.25);
+    expect(plane.normal).toEqual([0, 0, 2]);
+    send("pointerup", 40);
+    send("pointermove", 80);
+    expect(move).toHaveBeenCalledOnce();
   });
 });
