@@ -65,7 +65,7 @@ const steps = [
   ["where the mesh is worst is shown", async () => {
     await page.click("#quality");
     await viewer.until("the worst cells", (now) => "worst cells" in now.views);
-    await viewer.holds("ten rings around them", () => document.querySelectorAll("#marks circle.cell").length === 10);
+    await viewer.holds("ten outlines and rings around them", () => ["circle", "path"].every((shape) => document.querySelectorAll(`#marks ${shape}.cell`).length === 10));
     await filmed("worst");
     await page.click("#quality");
     await viewer.until("the worst cells gone", (now) => !("worst cells" in now.views));

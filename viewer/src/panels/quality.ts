@@ -1,4 +1,4 @@
-/** "min quality" as a button: has the worst cells streamed, flies to the worst and rings ten of them. Again: takes them away. */
+/** "min quality" as a button: has the worst cells streamed, flies to the worst, outlines and rings ten of them. Again: takes them away. */
 import type { Pipelines } from "../connection/pipelines";
 import { digits } from "../number";
 import type { Stand } from "../picture/camera";
@@ -91,7 +91,7 @@ export class WorstCells {
   update(): void {
     const layer = this.shown ? this.scene.layers.get(WORST) : undefined;
     const cells = layer?.topology && layer.frame ? worstOf(layer.topology, layer.frame) : [];
-    this.marks.set("worst", cells.map(({ quality, centroid }, i) => ({ points: [centroid], label: i === 0 ? `quality ${digits(quality, 3)}` : "", kind: "cell" as const })));
+    this.marks.set("worst", cells.map(({ quality, centroid, edges }, i) => ({ points: [centroid], edges, label: i === 0 ? `quality ${digits(quality, 3)}` : "", kind: "cell" as const })));
     const [worst] = cells;
     if (!worst || !this.isToFly) return;
     this.isToFly = false;

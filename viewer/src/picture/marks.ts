@@ -2,8 +2,8 @@
 import type { Vector } from "../connection/protocol";
 import { sameJson } from "../store/store";
 
-/** A mark: a point, or a line through several, and what is written beside the last. */
-export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" | "note" }
+/** A mark: a point, or a line through several, and what is written beside the last; with `edges` lines that outline what is marked. */
+export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" | "note"; edges?: readonly (readonly [Vector, Vector])[] }
 
 const RADII: Record<Mark["kind"], number> = { probe: 4, ruler: 4, cell: 9, note: 6 };
 const SVG = "http://www.w3.org/2000/svg";
@@ -33,9 +33,17 @@ export class Marks {
       element.textContent = text;
       made.push(element);
     };
-    for (const { points, label, kind } of [...this.groups.values()].flat()) {
-      const places = points.map((point) => this.place(point)).map(([x, y]): [number, number] => [x - box.left, y - box.top]);
+    const at = (point: Vector): [number, number] => {
+      const [x, y] = this.place(point);
+      return [x - box.left, y - box.top];
+    };
+    for (const { points, label, kind, edges = [] } of [...this.groups.values()].flat()) {
+      const places = points.map(at);
       if (places.some((at) => !at.every(Number.isFinite))) continue;
+      const ends = edges.map((edge) => edge.map(at)).filter((edge) => edge.flat().every(Number.isFinite));
+      const outline = ends.map(([from, to]) => `M${from!.join()}L${to!.join()}`).join("");
+      // On a ground of its own it is seen over every colour.
+      if (outline !== "") for (const name of ["ground", kind]) make("path", { class: name, d: outline });
       if (places.length > 1) make("polyline", { class: kind, points: places.map((at) => at.join(",")).join(" ") });
       for (const [x, y] of places) make("circle", { class: kind, cx: x, cy: y, r: RADII[kind] });
       const last = places.at(-1);

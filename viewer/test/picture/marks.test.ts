@@ -45,6 +45,14 @@ describe("marks over the picture", () => {
     expect(place).toHaveBeenCalledTimes(1);
   });
 
+  it("outline a cell over everything, beside the ring that tells where a small one is", () => {
+    marks.set("worst", [{ points: [[1, 1, 0]], label: "", kind: "cell", edges: [[[0, 0, 0], [2, 0, 0]], [[2, 0, 0], [2, 3, 0]]] }]);
+    expect([...root.querySelectorAll("path")].map((path) => [path.getAttribute("class"), path.getAttribute("d")])).toEqual([["ground", "M0,0L200,0M200,0L200,300"], ["cell", "M0,0L200,0M200,0L200,300"]]);
+    expect(root.querySelectorAll("circle.cell").length).toBe(1);
+    marks.set("worst", []);
+    expect(root.childNodes.length).toBe(0);
+  });
+
   it("plots pinned places, each field by itself, and forgets them", () => {
     const history = new History();
     const asked: string[] = [];
