@@ -6,9 +6,11 @@ import { digits } from "../number";
 import { placeNames, shortened } from "./mark-names";
 import { monitorHint, monitorText } from "./monitor-names";
 import { SERIES_COLOURS, axesOf, calm, labelled, roomy, seriesColour, seriesStyle } from "./plotting";
+import { containing, pinched, watchPlot, within, zoomed } from "./plot-control";
+import type { Span } from "./plot-control";
 import type { Tab } from "./dock";
 import type { Comparison, History, Mark, Series } from "./series";
-import { compare, firstChoice } from "./series";
+import { areTold, compare, firstChoice, lastAt, valueAt } from "./series";
 import { ValueTable } from "./table";
 
 /** The most series that are drawn at once: one for each colour. */
@@ -37,8 +39,18 @@ export class HistoryPlot implements Tab {
   /** The row of the table that the cursor is at; null where it is not over the plot. */
   private row: number | null = null;
   private cycles: number[] = [];
-  private zoom: [number, number] | null = null;
-  private readonly canvas = element("div", { class: "plot" });
+  private times: number[] = [];
+  /** The cycle at which keys or a finger have put the cursor; null where it goes with the mouse. */
+  private held: number | null = null;
+  /** What the axis goes over, where the run tells its times. */
+  private isOverTime = false;
+  /** The part of the axis that is shown; null for the whole. */
+  private zoom: Span | null = null;
+  /** What was shown when a pinch began. */
+  private pinchedFrom: Span = [0, 1];
+  private readonly canvas = element("div", { class: "plot", tabindex: 0, role: "slider", "aria-label": "cursor of the history", title: "+ and − zoom, arrows move the cursor, 0 shows the whole" });
+  private readonly axes = element("div", { class: "axes", role: "group", "aria-label": "Plotted over" },
+    ...["cycle", "time"].map((name, i) => element("button", { type: "button", class: "small", "aria-pressed": String(i === 0), onclick: () => this.plotOver(i === 1) }, name)));
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
   private readonly heading = element("p", { class: "hint table-title" });
   private readonly table = new ValueTable(["value", "before", "difference"], this.heading);
@@ -56,7 +68,19 @@ export class HistoryPlot implements Tab {
     this.body = element("div", { class: "dock-body" }, this.canvas,
       element("div", { class: "values" }, this.heading, this.table.element,
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
-    this.tools = [element("span", { class: "hint" }, "drag to zoom · double-click for the whole"), this.whole, csv];
+    this.tools = [element("span", { class: "hint" }, "drag or pinch to zoom · double-click for the whole"), this.axes, this.whole, csv];
+    this.axes.hidden = true;
+    // The mouse takes the cursor along, wherever it was put.
+    this.canvas.addEventListener("mousemove", () => { this.held = null; }, true);
+    watchPlot(this.canvas, () => this.canvas.querySelector(".u-over")?.getBoundingClientRect() ?? null, {
+      zoomBy: (factor) => this.zoomBy(factor), whole: () => this.zoomTo(null), step: (by) => this.step(by),
+      point: (at) => {
+        const along = this.shown[0] + at * (this.shown[1] - this.shown[0]);
+        this.hold(this.isOverTime ? valueAt(this.times, this.cycles, along) : along);
+      },
+      pinchBegun: () => { this.pinchedFrom = this.shown; },
+      pinch: (from, to) => this.zoomTo(within(pinched(this.pinchedFrom, from, to), this.ends)),
+    });
     new ResizeObserver(() => this.resize()).observe(this.canvas);
   }
 
@@ -119,10 +143,13 @@ export class HistoryPlot implements Tab {
     this.list();
     const chosen = this.chosen();
     const series = chosen.flatMap((key) => this.history.series.find((one) => one.key === key) ?? []);
-    const { cycles, columns } = this.history.table(chosen);
-    this.cycles = cycles;
-    const shape = JSON.stringify(series.map(({ key, unit }) => [key, unit]));
-    const data: uPlot.AlignedData = [cycles, ...columns];
+    const { cycles, times, columns } = this.history.table(chosen);
+    [this.cycles, this.times] = [cycles, times];
+    const isTold = areTold(cycles, times);
+    this.axes.hidden = !isTold;
+    if (!isTold) this.turn(false);
+    const shape = JSON.stringify([this.isOverTime, series.map(({ key, unit }) => [key, unit])]);
+    const data: uPlot.AlignedData = [this.along, ...columns];
     if (this.plot && shape === this.drawn) {
       this.plot.setData(data, false);
       this.range();
@@ -130,7 +157,9 @@ export class HistoryPlot implements Tab {
       this.drawn = shape;
       this.plot?.destroy();
       this.plot = series.length > 0 ? this.make(series, data) : null;
+      if (this.zoom) this.range();
     }
+    this.place();
     this.values();
   }
 
@@ -170,7 +199,7 @@ export class HistoryPlot implements Tab {
       // A line goes on where only another source has spoken, and breaks where its own has said what is no number.
       series: [{}, ...series.map((one, i) => ({ label: one.name, scale: scaleOf(one), stroke: colour(i), width: 1.5, points: { show: false } }))],
       axes: [
-        { ...axis, size: 30, values: (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
+        { ...axis, size: 30, values: this.isOverTime ? labelled : (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) ? String(tick) : "")) },
         ...scales.slice(0, AXES).map((scale, i) => ({
           ...axis, scale, side: i % 2 === 0 ? 3 as const : 1 as const, size: roomy(58), grid: i === 0 ? grid : { show: false },
           // In the colour of its series, where it has but one.
@@ -181,6 +210,7 @@ export class HistoryPlot implements Tab {
       hooks: {
         draw: [(plot) => this.drawMarks(plot)],
         setCursor: [(plot) => {
+          if (this.held !== null) return;
           this.row = plot.cursor.idx ?? null;
           this.values();
         }],
@@ -189,9 +219,12 @@ export class HistoryPlot implements Tab {
           if (wide > 3) this.zoomTo([plot.posToVal(left, "x"), plot.posToVal(left + wide, "x")]);
           plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
         }],
+        setSize: [() => this.place()],
         ready: [(plot) => {
+          this.place();
           plot.over.addEventListener("dblclick", () => this.zoomTo(null));
           plot.over.addEventListener("mouseleave", () => {
+            if (this.held !== null) return;
             this.row = null;
             this.values();
           });
@@ -200,15 +233,86 @@ export class HistoryPlot implements Tab {
     }, data, this.canvas);
   }
 
-  private zoomTo(zoom: [number, number] | null): void {
+  private zoomTo(zoom: Span | null): void {
     this.zoom = zoom;
     this.whole.disabled = zoom === null;
     this.range();
+    this.place();
+  }
+
+  /** What the axis goes over. */
+  private get along(): number[] {
+    return this.isOverTime ? this.times : this.cycles;
+  }
+
+  /** Where on the axis a cycle is, of which nothing may have been said. */
+  private placeOf(cycle: number): number {
+    return this.isOverTime ? valueAt(this.cycles, this.times, cycle) : cycle;
+  }
+
+  private get ends(): Span {
+    const [min, max] = [this.along[0] ?? 0, this.along.at(-1) ?? 1];
+    return [min, max > min ? max : min + 1];
+  }
+
+  private get shown(): Span {
+    return this.zoom ?? this.ends;
   }
 
   private range(): void {
-    const [min, max] = this.zoom ?? [this.cycles[0] ?? 0, this.cycles.at(-1) ?? 1];
-    this.plot?.setScale("x", { min, max: max > min ? max : min + 1 });
+    const [min, max] = this.shown;
+    this.plot?.setScale("x", { min, max });
+  }
+
+  private plotOver(isOverTime: boolean): void {
+    this.turn(isOverTime);
+    this.draw();
+  }
+
+  /** Lets the axis go over time or over cycles; what is shown stays. */
+  private turn(isOverTime: boolean): void {
+    if (isOverTime === this.isOverTime) return;
+    const before = this.along;
+    this.isOverTime = isOverTime;
+    this.zoom = this.zoom && this.zoom.map((end) => valueAt(before, this.along, end)) as unknown as Span;
+    [...this.axes.children].forEach((button, i) => button.setAttribute("aria-pressed", String((i === 1) === isOverTime)));
+  }
+
+  /** Zooms around the cursor, or around the middle where there is none. */
+  private zoomBy(factor: number): void {
+    const [low, high] = this.shown;
+    const at = this.row === null ? NaN : this.along[this.row]!;
+    this.zoomTo(within(zoomed(this.shown, at >= low && at <= high ? at : (low + high) / 2, factor), this.ends));
+  }
+
+  /** Moves the cursor by so many values; where there is none it begins at the last. */
+  private step(by: number): void {
+    const last = this.cycles.length - 1;
+    const row = Math.min(last, Math.max(0, (this.row ?? last) + by));
+    const at = this.along[row];
+    if (at === undefined) return;
+    this.hold(this.cycles[row]!);
+    if (this.zoom) this.zoomTo(within(containing(this.zoom, at), this.ends));
+  }
+
+  private hold(cycle: number): void {
+    this.held = cycle;
+    this.place();
+    this.values();
+  }
+
+  /** Draws the cursor where it was put: the values are other ones, or the axis. */
+  private place(): void {
+    if (this.held === null) return;
+    const after = lastAt(this.cycles, this.held) + 1;
+    // The nearest of those that are kept.
+    const [before, behind] = [this.cycles[after - 1] ?? -Infinity, this.cycles[after] ?? Infinity];
+    this.row = this.cycles.length === 0 ? null : this.held - before <= behind - this.held ? after - 1 : after;
+    const { plot, row } = this;
+    if (!plot || row === null) return;
+    // The plot takes another part of its axis at the end of the task: until then it knows only the old places.
+    const [low, high] = this.shown;
+    plot.setCursor({ left: ((this.along[row]! - low) / (high - low)) * plot.over.clientWidth, top: plot.over.clientHeight / 2 }, false);
   }
 
   private drawMarks(plot: uPlot): void {
@@ -226,7 +330,7 @@ export class HistoryPlot implements Tab {
     const measure = (text: string): number => ctx.measureText(text).width;
     const marks = this.marks.map(({ cycle, label }) => {
       const text = label.length > LONGEST_NAME ? `${label.slice(0, LONGEST_NAME - 1)}…` : label;
-      return { text, x: Math.round(plot.valToPos(cycle, "x", true)) + 0.5, width: measure(text) };
+      return { text, x: Math.round(plot.valToPos(this.placeOf(cycle), "x", true)) + 0.5, width: measure(text) };
     });
     for (const { x } of marks) {
       ctx.beginPath();
@@ -267,9 +371,13 @@ export class HistoryPlot implements Tab {
       return { name: one ? label(one) : "", title: one ? hintOf(one) : "", colour: seriesStyle(i), cells: [digits(found.value), digits(found.before), shown], hint };
     });
     const { label: text } = (order ?? { label: "" }) as Mark;
-    write(this.heading, `cycle ${cycle}${text === "" ? "" : ` · before: ${text}`}`);
+    const at = this.isOverTime ? ` · time ${digits(this.times[this.row ?? this.times.length - 1])}` : "";
+    write(this.heading, `cycle ${cycle}${at}${text === "" ? "" : ` · before: ${text}`}`);
     this.heading.title = this.heading.textContent;
     this.table.show(rows);
+    // Whoever listens is told of what they went to, and not of each value that comes.
+    const said = { valuemin: this.cycles[0], valuemax: last, valuenow: cycle, valuetext: this.row === null ? "the newest values" : [`cycle ${cycle}`, ...rows.map(({ name, cells: [value, before, difference] }) => `${name} ${value}${before === "–" ? "" : `, before ${before}, ${difference}`}`)].join("; ") };
+    for (const [name, value] of Object.entries(said)) this.canvas.setAttribute(`aria-${name}`, String(value));
   }
 
   private size(): { width: number; height: number } {

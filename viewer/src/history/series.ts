@@ -188,8 +188,21 @@ function readKept(text: string): KeptSource[] {
 
 export const seriesKey = (source: string, name: string): string => `${source}\u0000${name}`;
 
+/** Whether times are those of a run, which rise with its cycles, and do not only stand in for them. */
+export function areTold(cycles: readonly number[], times: readonly number[]): boolean {
+  return times.some((time, row) => time !== cycles[row]) && times.every((time, row) => row === 0 || time > times[row - 1]!);
+}
+
+/** What stands in one rising list beside a value of another: between two of them in the same proportion. */
+export function valueAt(of: readonly number[], beside: readonly number[], value: number): number {
+  const row = Math.min(Math.max(lastAt(of, value), 0), Math.max(0, of.length - 2));
+  const [a, b, c, d] = [of[row], of[row + 1], beside[row], beside[row + 1]];
+  if (a === undefined || c === undefined) return value;
+  return b === undefined || d === undefined || b === a ? c : c + ((value - a) * (d - c)) / (b - a);
+}
+
 /** The last index whose cycle is not beyond one; -1 where all are. */
-function lastAt(cycles: readonly number[], cycle: number): number {
+export function lastAt(cycles: readonly number[], cycle: number): number {
   let low = 0, high = cycles.length;
   while (low < high) {
     const middle = (low + high) >> 1;

@@ -7,12 +7,15 @@ import { labelled, padded } from "../../src/history/plotting";
 import { History, seriesKey } from "../../src/history/series";
 
 /** Stands in for a plot, which needs a canvas. */
-const made = vi.hoisted(() => [] as { options: uPlot.Options; data: uPlot.AlignedData; redraw: () => void }[]);
+interface Made { options: uPlot.Options; data: uPlot.AlignedData; redraw: () => void; setScale: ReturnType<typeof vi.fn>; setCursor: ReturnType<typeof vi.fn> }
+const made = vi.hoisted(() => [] as Made[]);
 vi.mock("uplot", () => ({
   default: class {
     redraw = vi.fn();
     setData = vi.fn();
     setScale = vi.fn();
+    setCursor = vi.fn();
+    over = { clientWidth: 400, clientHeight: 100 };
     destroy = vi.fn();
     constructor(readonly options: uPlot.Options, readonly data: uPlot.AlignedData) { made.push(this); }
   },
@@ -153,5 +156,112 @@ describe("the plots below the picture", () => {
     const [low, high] = range(null, 129.37729, 129.37731);
     expect((high - low) / 129.3773).toBeCloseTo(1e-4, 9);
     expect(range(null, 129, 131)).toEqual([128.88, 131.12]);
+  });
+
+  describe("by keys and fingers", () => {
+    let plot: HistoryPlot;
+    const canvas = (): HTMLElement => plot.body.querySelector<HTMLElement>(".plot")!;
+    const key = (name: string, more: KeyboardEventInit = {}): boolean => canvas().dispatchEvent(new KeyboardEvent("keydown", { key: name, bubbles: true, cancelable: true, ...more }));
+    const shown = (): unknown => made.at(-1)!.setScale.mock.lastCall?.[1];
+    const heading = (): string => plot.body.querySelector(".table-title")!.textContent;
+    const cells = (): (string | null)[] => texts(plot, "tbody td");
+    const whole = (): HTMLButtonElement => plot.tools.find((tool): tool is HTMLButtonElement => tool.textContent === "Whole")!;
+    const over = (name: string): HTMLButtonElement => [...plot.tools.flatMap((tool) => [...tool.querySelectorAll("button")])].find(({ textContent }) => textContent === name)!;
+    const open = (time: (cycle: number) => number): History => {
+      const history = new History();
+      for (let cycle = 0; cycle <= 100; cycle += 10) history.add("flow", cycle, time(cycle), { drop: cycle === 0 ? 1 : 2 + cycle / 100 });
+      plot = new HistoryPlot(history, null, () => undefined);
+      document.body.append(plot.body);
+      plot.setMarks([{ cycle: 30, label: "Throat" }]);
+      plot.show(true);
+      return history;
+    };
+
+    it("the cursor goes from value to value, and the values and those before the last order with it", () => {
+      open((cycle) => cycle / 1000);
+      expect([heading(), canvas().getAttribute("aria-valuetext")]).toEqual(["cycle 100 · before: Throat", "the newest values"]);
+      key("ArrowLeft");
+      expect([heading(), cells()]).toEqual(["cycle 90 · before: Throat", ["2.9", "2.3", "+26.1\u00a0%"]]);
+      expect([canvas().getAttribute("aria-valuenow"), canvas().getAttribute("aria-valuetext")]).toEqual(["90", "cycle 90; Drop 2.9, before 2.3, +26.1\u00a0%"]);
+      expect(made[0]!.setCursor.mock.lastCall![0]).toMatchObject({ left: 360 });
+      key("Home");
+      expect([heading(), cells()[0]]).toEqual(["cycle 0", "1"]);
+      key("ArrowRight", { shiftKey: true });
+      expect(heading()).toContain("cycle 100");
+    });
+
+    it("the cursor stays at its cycle while values come, until the mouse takes it", () => {
+      const history = open((cycle) => cycle / 1000);
+      key("ArrowLeft");
+      history.add("flow", 110, 0.11, { drop: 5 });
+      plot.show(true);
+      expect(heading()).toContain("cycle 90");
+      canvas().dispatchEvent(new MouseEvent("mousemove"));
+      const [hook] = made[0]!.options.hooks!.setCursor! as ((plot: unknown) => void)[];
+      hook!({ cursor: { idx: 2 } });
+      expect(heading()).toBe("cycle 20");
+    });
+
+    it("+ and - zoom around the cursor, which is followed where it leaves what is shown, and 0 or Whole shows all", () => {
+      open((cycle) => cycle / 1000);
+      expect(whole().disabled).toBe(true);
+      key("+");
+      expect([shown(), whole().disabled]).toEqual([{ min: 25, max: 75 }, false]);
+      key("End");
+      expect(shown()).toEqual({ min: 50, max: 100 });
+      key("+");
+      expect(shown()).toEqual({ min: 75, max: 100 });
+      key("-");
+      key("0");
+      expect([shown(), whole().disabled]).toEqual([{ min: 0, max: 100 }, true]);
+      key("+");
+      whole().click();
+      expect(shown()).toEqual({ min: 0, max: 100 });
+      expect(key("x")).toBe(true);
+    });
+
+    it("a tap puts the cursor at the nearest value, and a pinch zooms", () => {
+      open((cycle) => cycle / 1000);
+      const area = document.createElement("div");
+      area.className = "u-over";
+      area.getBoundingClientRect = () => ({ left: 0, width: 400 }) as DOMRect;
+      canvas().append(area);
+      const finger = (kind: string, pointerId: number, x: number): void => void area.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType: "touch", clientX: x }));
+      finger("pointerdown", 1, 175);
+      finger("pointerup", 1, 175);
+      expect(heading()).toContain("cycle 40");
+      finger("pointerdown", 1, 100);
+      finger("pointerdown", 2, 300);
+      finger("pointermove", 1, 0);
+      finger("pointermove", 2, 400);
+      expect(shown()).toEqual({ min: 25, max: 75 });
+    });
+
+    it("go over time where the run tells it, with what is shown, the orders and the cursor at the same cycles", () => {
+      open((cycle) => cycle / 1000);
+      key("+");
+      over("time").click();
+      expect([made.length, made[1]!.data[0], shown()]).toEqual([2, [0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.1], { min: 0.025, max: expect.closeTo(0.075, 12) }]);
+      expect(["cycle", "time"].map((name) => over(name).getAttribute("aria-pressed"))).toEqual(["false", "true"]);
+      key("End");
+      expect(heading()).toBe("cycle 100 · time 0.1 · before: Throat");
+      const placed: number[] = [];
+      const nothing = (): undefined => undefined;
+      const ctx = new Proxy({ measureText: () => ({ width: 5 }) } as Record<string, unknown>, { get: (target, name: string) => target[name] ?? nothing });
+      const [draw] = made[1]!.options.hooks!.draw! as ((plot: unknown) => void)[];
+      draw!({ ctx, bbox: { left: 0, top: 0, width: 400, height: 100 }, valToPos: (value: number) => { placed.push(value); return 0; } });
+      expect(placed).toEqual([expect.closeTo(0.03, 12)]);
+      over("cycle").click();
+      expect(made[2]!.data[0]!.at(-1)).toBe(100);
+    });
+
+    it("go over cycles alone where no time is told, or one that does not rise with them", () => {
+      for (const time of [(cycle: number) => cycle, () => 0, (cycle: number) => -cycle]) {
+        open(time);
+        expect(over("time").parentElement!.hidden).toBe(true);
+      }
+      open((cycle) => cycle / 2);
+      expect(over("time").parentElement!.hidden).toBe(false);
+    });
   });
 });

@@ -1,0 +1,58 @@
+// @vitest-environment jsdom
+import { beforeEach, describe, expect, it } from "vitest";
+import { containing, pinched, watchPlot, within, zoomed } from "../../src/history/plot-control";
+
+describe("the part of an axis that is shown", () => {
+  it("grows and shrinks around what stays where it is seen", () => {
+    expect(zoomed([0, 100], 20, 0.5)).toEqual([10, 60]);
+    expect(zoomed([10, 60], 20, 2)).toEqual([0, 100]);
+  });
+
+  it("has what lay under two fingers under them after a pinch", () => {
+    expect(pinched([0, 100], [0.4, 0.6], [0.2, 0.8])).toEqual([expect.closeTo(100 / 3, 9), expect.closeTo(200 / 3, 9)]);
+    expect(pinched([0, 100], [0.2, 0.4], [0.5, 0.7])).toEqual([expect.closeTo(-30, 9), expect.closeTo(70, 9)]);
+    expect(pinched([0, 100], [0.2, 0.4], [0.5, 0.5])).toEqual([0, 100]);
+    expect(pinched([0, 100], [0.2, 0.4], [0.6, 0.5])).toEqual([0, 100]);
+  });
+
+  it("lies within the whole, is not smaller than can be shown, and follows the cursor", () => {
+    expect([within([-20, 30], [0, 100]), within([80, 130], [0, 100]), within([-5, 200], [0, 100])]).toEqual([[0, 50], [50, 100], null]);
+    expect(within([50, 50], [0, 100])).toEqual([49.95, expect.closeTo(50.05, 9)]);
+    expect([containing([10, 20], 25), containing([10, 20], 4), containing([10, 20], 12)]).toEqual([[15, 25], [4, 14], [10, 20]]);
+  });
+});
+
+describe("fingers on a plot", () => {
+  let asked: unknown[];
+  let root: HTMLElement;
+  const send = (kind: string, pointerId: number, x: number, pointerType = "touch"): boolean =>
+    root.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType, clientX: x }));
+  beforeEach(() => {
+    asked = [];
+    root = document.createElement("div");
+    watchPlot(root, () => ({ left: 100, width: 200 }), {
+      zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
+      pinchBegun: () => asked.push("begun"), pinch: (from, to) => asked.push(["pinch", from, to]),
+    });
+  });
+
+  it("put the cursor where one taps, of which the browser makes no drag of a mouse", () => {
+    expect(send("pointerdown", 1, 150)).toBe(false);
+    send("pointerup", 1, 150);
+    send("pointermove", 1, 170);
+    expect(asked).toEqual([["point", 0.25]]);
+    expect(send("pointerdown", 2, 150, "mouse")).toBe(true);
+    expect(asked.length).toBe(1);
+  });
+
+  it("zoom by a pinch, after which the one that stays longer moves nothing", () => {
+    send("pointerdown", 1, 150);
+    send("pointerdown", 2, 250);
+    send("pointermove", 2, 300);
+    send("pointerup", 2, 300);
+    send("pointermove", 1, 120);
+    send("pointerup", 1, 120);
+    send("pointerdown", 3, 200);
+    expect(asked).toEqual([["point", 0.25], "begun", ["pinch", [0.25, 0.75], [0.25, 1]], ["point", 0.5]]);
+  });
+});
