@@ -17,6 +17,7 @@ import { History, seriesKey } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
 import { LinePlot } from "./history/line-plot";
+import { MESH, SMALLEST, isMonitored, takeQuality } from "./history/mesh-quality";
 import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
 import { pointed } from "./number";
@@ -340,7 +341,12 @@ function takeMessage(message: ServerMessage): void {
   if (message.kind !== "status") bar.alive();
   switch (message.kind) {
     case "hello": return takeHello(message.body);
-    case "status": return store.dispatch({ type: "status", status: message.body, at: performance.now() });
+    case "status":
+      if (store.state.hello?.monitors && takeQuality(monitored, store.state.hello.monitors, message.body)) {
+        history.update();
+        dock.update();
+      }
+      return store.dispatch({ type: "status", status: message.body, at: performance.now() });
     case "order": return store.dispatch({ type: "order", status: message.body });
     case "parameters": return store.dispatch({ type: "parameters", values: message.body.values });
     case "stack": return stack.change(message.body);
@@ -420,7 +426,7 @@ store.watch((state) => state.hello, (hello) => {
   if (hello.monitors) {
     const shown = hello.monitors.filter(({ pipeline }) => pipeline !== WORST);
     monitors.keep(shown);
-    monitored.keep(shown.map(({ pipeline, name }) => seriesKey(pipeline, name)));
+    monitored.keep([...shown.map(({ pipeline, name }) => seriesKey(pipeline, name)), ...(isMonitored(shown) ? [] : [seriesKey(MESH, SMALLEST)])]);
   }
   if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
 });

@@ -4,6 +4,7 @@ import "uplot/dist/uPlot.min.css";
 import { download, element, write } from "../dom";
 import { digits } from "../number";
 import { placeNames, shortened } from "./mark-names";
+import { MESH } from "./mesh-quality";
 import { monitorHint, monitorText } from "./monitor-names";
 import { SERIES_COLOURS, axesOf, calm, labelled, roomy, seriesColour, seriesStyle } from "./plotting";
 import { containing, pinched, watchPlot, within, zoomed } from "./plot-control";
@@ -405,6 +406,7 @@ function label({ source, name, unit }: Series): string {
 
 /** A series in words, with the name by which conditions and files call it where it is a monitor. */
 function hintOf(series: Series): string {
+  if (series.source === MESH) return "The smallest scaled Jacobian of all cells, as the run tells it";
   return PIN.test(series.source) ? label(series) : `${label(series)}: ${monitorHint(series.source, series.name)}`;
 }
 

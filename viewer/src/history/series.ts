@@ -1,4 +1,5 @@
 /** What monitors have said over time, within bounds: old values thin out, however long a run lasts. */
+import { MESH } from "./mesh-quality";
 
 /** The most times of one source. Where there are more, every other one of the older half is forgotten. */
 export const TIMES = 2000;
@@ -262,8 +263,12 @@ function difference(value: number, before: number): number {
 export function firstChoice(series: readonly Series[]): string[] {
   // Of the patterns for one thing the first that any of them meets.
   const wanted = [[/quality\.min$/], [/drop/, /pressure/], [/mass|flux|balance/]];
-  const met = (pattern: RegExp): Series | undefined => series.find(({ source, name }) => pattern.test(name) || (pattern.test(source) && !/quality/.test(name)));
+  const ofMonitors = series.filter(({ source }) => source !== MESH);
+  // What a monitor measures comes before what the run tells without one.
+  const all = [...ofMonitors, ...series.filter(({ source }) => source === MESH)];
+  const met = (pattern: RegExp): Series | undefined => all.find(({ source, name }) => pattern.test(name) || (pattern.test(source) && !/quality/.test(name)));
   const found = wanted.flatMap((patterns) => patterns.map(met).find((one) => one !== undefined) ?? []);
-  const keys = new Set((found.length > 0 ? found : series.slice(0, 2)).map(({ key }) => key));
+  const isOfMonitor = found.some(({ source }) => source !== MESH);
+  const keys = new Set([...found, ...(isOfMonitor ? [] : ofMonitors.slice(0, 2))].map(({ key }) => key));
   return [...keys];
 }
