@@ -5,7 +5,7 @@ import { element, identifier, write } from "../dom";
 import { mark } from "../form/controls";
 import { digits, readNumber, whyNoNumber } from "../number";
 import { own } from "../own";
-import { atOffset, extent, offsetOf, planeOf, withPlane } from "../store/pipelines";
+import { atOffset, extent, leadingPlane, offsetOf, planesOf, whyNotMoved, withPlane } from "../store/pipelines";
 import type { Plane } from "../store/pipelines";
 import type { Sliced } from "../picture/slice-handle";
 import { whyNotSteering } from "../store/run";
@@ -22,6 +22,8 @@ export class SlicePanel implements Sliced {
   private readonly wrong = element("small", { class: "wrong", hidden: true, role: "alert", id: identifier("wrong") });
   private readonly note = element("p", { class: "hint" });
   private readonly axes: HTMLButtonElement[];
+  /** What moves the slice. */
+  private readonly movers: HTMLElement[];
   /** Where the slice of the chosen view lies, as far as is known. */
   private plane: Plane | null = null;
   /** The slice for which something wrong was typed: it stays there, with the reason, until there is another one. */
@@ -32,9 +34,11 @@ export class SlicePanel implements Sliced {
   /** `bounds` is the box around all that is there. */
   constructor(private readonly root: HTMLElement, private readonly store: Store<State, Action>, private readonly pipelines: Pipelines, private readonly bounds: () => [Vector, Vector] | null) {
     this.axes = ["x", "y", "z"].map((name, axis) => element("button", { type: "button", class: "small", title: `Cut across ${name}`, onclick: () => this.across(axis) }, name));
-    root.replaceChildren(element("h2", {}, "Slice"),
+    this.movers = [
       element("div", { class: "field" }, element("span", { class: "label" }, "across"), element("div", { class: "axes", role: "group", "aria-label": "Cut across" }, ...this.axes)),
-      element("div", { class: "field" }, element("label", { for: this.offset.id }, "offset"), this.offset, this.wrong), this.slider, this.note);
+      element("div", { class: "field" }, element("label", { for: this.offset.id }, "offset"), this.offset, this.wrong), this.slider,
+    ];
+    root.replaceChildren(element("h2", {}, "Slice"), ...this.movers, this.note);
     pipelines.onChange(() => this.show());
     store.watch((state) => state.chosenView, () => this.show());
     store.watch(whyNotSteering, () => this.show());
@@ -42,11 +46,19 @@ export class SlicePanel implements Sliced {
 
   private show(): void {
     const why = whyNotSteering(this.store.state);
-    this.plane = planeOf(this.pipelines.get(this.store.state.chosenView));
-    this.root.hidden = this.plane === null;
+    const pipeline = this.pipelines.get(this.store.state.chosenView);
+    this.plane = leadingPlane(pipeline);
+    const fixed = whyNotMoved(pipeline);
+    this.root.hidden = this.plane === null && fixed === "";
+    for (const mover of this.movers) mover.hidden = fixed !== "";
     for (const control of [this.slider, this.offset, ...this.axes]) control.disabled = why !== "";
-    write(this.note, why === "" ? "" : `The slice is where the run cuts. ${why}`);
-    this.note.hidden = why === "";
+    const count = planesOf(pipeline).length;
+    write(this.note, [
+      fixed === "" ? "" : `${fixed} It is changed under Pipelines.`,
+      this.plane && count > 1 ? `${count} planes move together; the offset is that of the first.` : "",
+      why === "" || !this.plane ? "" : `The slice is where the run cuts. ${why}`,
+    ].filter((text) => text !== "").join(" "));
+    this.note.hidden = this.note.textContent === "";
     const { plane } = this;
     if (!plane) return;
     const size = Math.max(...plane.normal.map(Math.abs));

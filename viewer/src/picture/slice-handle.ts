@@ -61,8 +61,8 @@ export class SliceHandle {
     const projection = cut.length > 2 ? this.picture.projection() : null;
     const corners = projection ? cut.map((point) => projection.toPicture(point)) : [];
     const normal = plane && normalised(plane.normal);
-    // At the end of the slice itself that is seen farthest to the left, where it hides little; it goes with the drag.
-    const at = projection ? leftmost(this.picture.points(), projection) : null;
+    // At the end of the slice itself that is seen farthest to the left, where it hides little; it goes with the drag. Other planes may be cut with it.
+    const at = projection && box ? leftmost(this.picture.points(), projection, near(plane, box)) ?? leftmost(this.picture.points(), projection) : null;
     const by = this.drag && plane && at ? this.drag.offset - dot(at, normalised(plane.normal)) : 0;
     const point = at && normal ? add(at, times(normal, by)) : null;
     const from = point && projection ? projection.toPicture(point) : null;
@@ -126,13 +126,23 @@ export class SliceHandle {
 /** Of so many points one is looked at for each of these. */
 const LOOKED_AT = 400;
 
-/** The point that is seen farthest to the left, of a part of all; null where none is seen. */
-function leftmost(points: Float32Array, projection: Projection): Vector | null {
+/** The part of the whole by which the points of a slice may lie beside its plane: they come with less than all digits. */
+const BESIDE = 2e-3;
+
+/** Whether a point lies in a plane, as far as frames tell. */
+function near(plane: Plane, box: readonly [Vector, Vector]): (point: Vector) => boolean {
+  const [normal, offset] = [normalised(plane.normal), offsetOf(plane)];
+  const [low, high] = extent(box, plane.normal);
+  return (point) => Math.abs(dot(point, normal) - offset) <= BESIDE * (high - low);
+}
+
+/** The point that is seen farthest to the left, of a part of those that are wanted; null where none is seen. */
+function leftmost(points: Float32Array, projection: Projection, isWanted: (point: Vector) => boolean = () => true): Vector | null {
   const stride = 3 * Math.max(1, Math.floor(points.length / 3 / LOOKED_AT));
   let best: Vector | null = null, least = Infinity;
   for (let i = 0; i + 2 < points.length; i += stride) {
     const point: Vector = [points[i]!, points[i + 1]!, points[i + 2]!];
-    const place = projection.toPicture(point);
+    const place = isWanted(point) ? projection.toPicture(point) : null;
     if (!place || place[0] >= least) continue;
     [best, least] = [point, place[0]];
   }

@@ -31,8 +31,51 @@ export function planeOf(pipeline: Pipeline | undefined): Plane | null {
   return null;
 }
 
+/** The planes of a pipeline's slice, of which it may have several; none where it has no slice, or one by something else. */
+export function planesOf(pipeline: Pipeline | undefined): Plane[] {
+  const single = planeOf(pipeline);
+  if (single) return [single];
+  const planes = sliceOf(pipeline)?.planes;
+  return (Array.isArray(planes) ? planes : []).flatMap((plane) => (typeof plane === "object" && plane !== null && !Array.isArray(plane) && isVector(plane.origin) && isVector(plane.normal)
+    ? [{ origin: plane.origin, normal: plane.normal }] : []));
+}
+
+/** The plane whose place says where a pipeline cuts: the first of those that it has, which move together; null where they have no direction in common. */
+export function leadingPlane(pipeline: Pipeline | undefined): Plane | null {
+  const [first, ...others] = planesOf(pipeline);
+  return first && others.every((other) => isParallel(first.normal, other.normal)) ? first : null;
+}
+
+const isParallel = (a: Vector, b: Vector): boolean => {
+  const along = a.reduce((sum, part, k) => sum + part * b[k]!, 0);
+  return Math.abs(along) > (1 - 1e-9) * Math.hypot(...a) * Math.hypot(...b);
+};
+
+const sliceOf = (pipeline: Pipeline | undefined): Body | null => pipeline?.stages.map((stage) => body(stage, "slice")).find((slice) => slice !== null) ?? null;
+
+/** Why a pipeline's slice has no one place along a direction, in words; empty where it has, or where there is no slice. */
+export function whyNotMoved(pipeline: Pipeline | undefined): string {
+  const slice = sliceOf(pipeline);
+  if (!slice || leadingPlane(pipeline)) return "";
+  return planesOf(pipeline).length > 1 ? "The planes of this slice have several directions." : `This slice is cut by a ${["sphere", "cylinder"].find((shape) => body(slice, shape)) ?? "surface"}, not by a plane.`;
+}
+
+/** The pipeline with its leading plane elsewhere. Other planes go with it, as far from it as they were. */
 export function withPlane(pipeline: Pipeline, { origin, normal }: Plane): Pipeline {
-  return { ...pipeline, stages: pipeline.stages.map((stage) => (body(stage, "slice") ? { slice: { origin, normal } } : stage)) };
+  const planes = planesOf(pipeline);
+  const [first] = planes;
+  const moved = planes.map((plane) => beside(plane, first!, { origin, normal }));
+  const slice: Body = planes.length > 1 ? { planes: moved.map((plane) => ({ ...plane })) } : { origin, normal };
+  return { ...pipeline, stages: pipeline.stages.map((stage) => (body(stage, "slice") ? { slice } : stage)) };
+}
+
+/** Where a plane is that was parallel to one that is another one now. */
+function beside(plane: Plane, before: Plane, now: Plane): Plane {
+  const distance = offsetOf({ ...plane, normal: before.normal }) - offsetOf(before);
+  if (!isParallel(before.normal, now.normal)) return atOffset(now, offsetOf(now) + distance);
+  const offset = offsetOf({ ...now, normal: before.normal }) + distance;
+  const isTurned = plane.normal.reduce((sum, part, k) => sum + part * before.normal[k]!, 0) < 0;
+  return atOffset(plane, isTurned ? -offset : offset);
 }
 
 /** Where a plane lies along its normal, from the origin of coordinates. */

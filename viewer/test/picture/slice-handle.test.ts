@@ -55,4 +55,18 @@ describe("the knob of a slice", () => {
     send("pointermove", 80);
     expect(move).toHaveBeenCalledOnce();
   });
+
+  it("stands at the plane that it moves, though others are cut with it", () => {
+    const root = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    const plane: Plane = { origin: [1, 0.5, 0.2], normal: [0, 0, 1] };
+    const at = (points: Float32Array): [number, number] | null => {
+      const handle = new SliceHandle(root, document.createElement("div"), { projection: () => OBLIQUE, points: () => points, bounds: () => BOX, redraw: () => undefined }, { movable: plane, move: () => undefined });
+      handle.drawn();
+      return handle.place;
+    };
+    const alone = at(Float32Array.of(1, 0.5, 0.2001, 2, 1, 0.2001));
+    // The other plane reaches farther to the left.
+    expect(at(Float32Array.of(0, 0, 0.8, 1, 0.5, 0.2001, 2, 1, 0.2001, 0, 1, 0.8))).toEqual(alone);
+    expect(at(Float32Array.of(0, 0, 0.8, 0, 1, 0.8))).not.toEqual(alone);
+  });
 });

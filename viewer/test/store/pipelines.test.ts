@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { Pipelines } from "../../src/connection/pipelines";
 import type { ClientMessage, Json, TopologyFrame } from "../../src/connection/protocol";
 import { worstOf } from "../../src/picture/worst";
-import { QUALITY, WORST, atOffset, countCells, countedIn, extent, lineOf, offsetOf, planeOf, poorRange, readPipelines, withLine, withPlane, withQuality, worstCells, worstUpTo } from "../../src/store/pipelines";
+import { QUALITY, WORST, atOffset, countCells, countedIn, extent, leadingPlane, lineOf, offsetOf, planeOf, planesOf, poorRange, readPipelines, whyNotMoved, withLine, withPlane, withQuality, worstCells, worstUpTo } from "../../src/store/pipelines";
 import type { Pipeline } from "../../src/store/pipelines";
 
 const cut: Pipeline = { name: "cut", every: { steps: 5 }, stages: [{ slice: { origin: [1, 2, 3], normal: [0, 2, 0] } }, { select: { fields: ["p"] } }, { stream: {} }] };
@@ -21,6 +21,26 @@ describe("changes of pipelines", () => {
     expect(offsetOf(planeOf(moved)!)).toBe(5);
     expect(planeOf({ name: "s", stages: [{ slice: { sphere: { center: [0, 0, 0], radius: 1 } } }, { surface: {} }, "pause"] })).toBeNull();
     expect(extent([[0, -1, 0], [1, 3, 2]], [0, -2, 0])).toEqual([-3, 1]);
+  });
+
+  it("moves parallel planes together, also those whose normal is another length or turned, and stacks them along another direction", () => {
+    const planes = [{ origin: [1, 2, 3], normal: [0, 2, 0] }, { origin: [0, 4, 0], normal: [0, -1, 0] }, { origin: [5, 1, 5], normal: [0, 1, 0] }];
+    const several: Pipeline = { name: "cuts", stages: [{ slice: { planes } }, { stream: {} }] };
+    const first = leadingPlane(several)!;
+    expect(first).toEqual(planes[0]);
+    const moved = withPlane(several, atOffset(first, 2.5));
+    expect(moved.stages[1]).toEqual({ stream: {} });
+    expect(planesOf(moved)).toEqual([{ origin: [1, 2.5, 3], normal: [0, 2, 0] }, { origin: [0, 4.5, 0], normal: [0, -1, 0] }, { origin: [5, 1.5, 5], normal: [0, 1, 0] }]);
+    expect(planesOf(withPlane(several, { origin: [7, 8, 9], normal: [1, 0, 0] }))).toEqual([7, 9, 6].map((x) => ({ origin: [x, 8, 9], normal: [1, 0, 0] })));
+    expect(whyNotMoved(several)).toBe("");
+  });
+
+  it("tells why a slice cannot be moved along a direction", () => {
+    const by = (slice: Json): string => whyNotMoved({ name: "s", stages: [{ slice }, { stream: {} }] });
+    expect(by({ planes: [{ origin: [0, 0, 0], normal: [0, 0, 1] }, { origin: [0, 0, 0], normal: [0, 1, 0] }] })).toBe("The planes of this slice have several directions.");
+    expect(by({ sphere: { center: [0, 0, 0], radius: 1 } })).toBe("This slice is cut by a sphere, not by a plane.");
+    expect(by({ cylinder: { origin: [0, 0, 0], axis: [0, 0, 1], radius: 1 } })).toBe("This slice is cut by a cylinder, not by a plane.");
+    expect([whyNotMoved(cut), whyNotMoved({ name: "s", stages: [{ surface: {} }] }), whyNotMoved(undefined)]).toEqual(["", "", ""]);
   });
 
   it("adds the quality of cells where a view selects, and where it takes all", () => {
