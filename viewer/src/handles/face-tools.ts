@@ -44,6 +44,7 @@ export class FaceTools implements ShapeRegion {
   private neighbours: Int32Array | null = null;
   private meant: { region: Json; faces: ReadonlySet<number>; points: ReadonlySet<number> } | null = null;
   private box: { points: Float32Array; meant: object; names: readonly string[]; bounds: [Vector, Vector] | null } | null = null;
+  private seen: { points: Float32Array; triangles: Uint32Array; key: string; faces: VisibleFaces } | null = null;
   private readonly bar = element("div", { class: "face-tools", role: "toolbar", "aria-label": "Choosing faces", hidden: true });
   private readonly buttons: Record<Tool, HTMLButtonElement>;
   private readonly mode = element("select", { "aria-label": "what a stroke does" },
@@ -149,7 +150,7 @@ export class FaceTools implements ShapeRegion {
     if (this.stroke || !this.surface) return;
     this.stage.setPointerCapture(event.pointerId);
     const mode = event.altKey ? "take" : event.shiftKey ? "add" : this.mode.value as Mode;
-    const seen = new VisibleFaces(this.surface.points, this.surface.triangles, this.picture.projection());
+    const seen = this.visible(this.surface, this.picture.projection());
     this.stroke = { pointer: event.pointerId, mode, path: [this.placeOf(event)], faces: new Set(), before: this.meant?.faces ?? new Set(), seen };
     this.extend(this.placeOf(event));
   }
@@ -312,13 +313,21 @@ export class FaceTools implements ShapeRegion {
     return [...points].filter((point) => own.has(point));
   }
 
+  /** What is seen of a surface. It is drawn once for each shape and place to look from, for every press asks. */
+  private visible({ points, triangles }: ShownPoints, projection: Projection): VisibleFaces {
+    const { key } = projection;
+    if (this.seen?.points !== points || this.seen.triangles !== triangles || this.seen.key !== key) {
+      this.seen = { points, triangles, key, faces: new VisibleFaces(points, triangles, projection) };
+    }
+    return this.seen.faces;
+  }
+
   /** The point of the chosen faces that is seen at a place; null where another face is, or none. */
   pick(place: Place): Vector | null {
     const { surface, meant } = this;
     if (!surface || !meant) return null;
     const projection = this.picture.projection();
-    const seen = new VisibleFaces(surface.points, surface.triangles, projection);
-    const face = seen.at(place);
+    const face = this.visible(surface, projection).at(place);
     if (face === null || !meant.faces.has(face)) return null;
     const corner = surface.triangles[3 * face]!;
     return projection.toSpace(place, projection.depth([surface.points[3 * corner]!, surface.points[3 * corner + 1]!, surface.points[3 * corner + 2]!]));

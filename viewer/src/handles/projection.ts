@@ -13,6 +13,11 @@ export class Projection {
    */
   constructor(private readonly matrix: ArrayLike<number>, readonly width: number, readonly height: number) {}
 
+  /** Tells projections apart: two that have the same show every point at the same place. */
+  get key(): string {
+    return `${this.width} ${this.height} ${Array.from(this.matrix).join(" ")}`;
+  }
+
   private row(index: number): { normal: Vector; offset: number } {
     const at = (k: number): number => this.matrix[4 * index + k]!;
     return { normal: [at(0), at(1), at(2)], offset: at(3) };

@@ -247,12 +247,13 @@ describe("the plots below the picture", () => {
       expect(heading()).toBe("cycle 100 · time 0.1 · before: Throat");
       const placed: number[] = [];
       const nothing = (): undefined => undefined;
-      const ctx = new Proxy({ measureText: () => ({ width: 5 }) } as Record<string, unknown>, { get: (target, name: string) => target[name] ?? nothing });
+      const known: Record<string, unknown> = { measureText: () => ({ width: 5 }) };
+      const ctx = new Proxy(known, { get: (target, name: string) => target[name] ?? nothing });
       const [draw] = made[1]!.options.hooks!.draw! as ((plot: unknown) => void)[];
       draw!({ ctx, bbox: { left: 0, top: 0, width: 400, height: 100 }, valToPos: (value: number) => { placed.push(value); return 0; } });
       expect(placed).toEqual([expect.closeTo(0.03, 12)]);
       over("cycle").click();
-      expect(made[2]!.data[0]!.at(-1)).toBe(100);
+      expect(made[2]!.data[0].at(-1)).toBe(100);
     });
 
     it("go over cycles alone where no time is told, or one that does not rise with them", () => {
