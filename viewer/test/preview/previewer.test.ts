@@ -2,6 +2,11 @@ import { beforeEach, describe, expect, it, vi } from "vitest";
 import type { PreviewAnswer, PreviewRequest } from "../../src/preview/preview.worker";
 import { Previewer } from "../../src/preview/previewer";
 import type { Scene } from "../../src/picture/scene";
+import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
+import { Ghost } from "../../src/picture/ghost";
+import type { Piece } from "../../src/picture/layer";
+import type { Bones } from "../../src/picture/skeleton";
+import type { PreviewSurface } from "../../src/preview/preview";
 import { page } from "../page";
 
 /** Stands in for the thread that computes. */
@@ -37,6 +42,90 @@ describe("what is wrong with a shape", () => {
       return store.state.preview.brokenIn;
     };
     expect([told(1), told(0, 1), told(1, 2)]).toEqual([["throat"], ["wall", "throat"], []]);
+  });
+});
+
+describe("what is seen of a shape while a hand makes it", () => {
+  const SURFACE: PreviewAnswer = { id: "s", surface: { triangles: Uint32Array.of(0, 1, 2, 0, 2, 3), triangleFeatures: Uint32Array.of(0, 1), features: ["wall", "throat"] } };
+  const BONES: Bones = { reference: Float64Array.of(0, 0, 0, 1, 0, 0), now: Float32Array.of(0, 0, 0, 1, 0, 0), preview: null, segments: Uint32Array.of(0, 1), free: new Uint32Array(0), curves: [Uint32Array.of(0, 1)], features: [null] };
+  const settled = () => new Promise((resolve) => setTimeout(resolve, 0));
+  let made: ReturnType<typeof page>;
+  let previewer: Previewer;
+  let ghost: Ghost;
+  let bones: Bones | null;
+  /** The triangles that are drawn as broken; none where they are not seen. */
+  const broken = (): number[] => {
+    const { actor, data } = (ghost as unknown as { broken: Piece }).broken;
+    return actor.getVisibility() ? [...data.getPolys().getData()] : [];
+  };
+  const last = (key: "number" | "check"): number => StandIn.last.asked.flatMap((request) => (key in request ? [(request as Record<typeof key, number>)[key]] : [])).at(-1)!;
+  /** The hand asks for a shape, and it comes. */
+  const drag = (by: number): Float32Array => {
+    made.store.dispatch({ type: "composed", key: "translate", values: { by: [by, 0, 0] }, step: "drag" });
+    const points = new Float32Array(12).fill(by);
+    StandIn.last.answer({ number: last("number"), points, nodes: Float32Array.of(by, 0, 0, 1 + by, 0, 0), largest: by, moved: [by, 0], size: 1, milliseconds: 1 });
+    return points;
+  };
+  const judge = (...triangles: number[]): void => StandIn.last.answer({ check: last("number"), faults: triangles.length > 0 ? { text: "it folds", triangles: Uint32Array.from(triangles) } : null });
+
+  beforeEach(async () => {
+    ghost = new Ghost(vtkRenderer.newInstance());
+    bones = null;
+    const picture = {
+      setPreviewSurface: (surface: PreviewSurface) => ghost.setSurface(surface),
+      setPreview: (points: Float32Array | null, faults?: Uint32Array, drawn?: () => void) => {
+        ghost.setPoints(points, faults);
+        drawn?.();
+      },
+      setBones: (shown: Bones | null) => { bones = shown; },
+      get shownBones() { return bones; },
+    } as unknown as Scene;
+    made = page();
+    made.store.dispatch({ type: "part", feature: "throat", part: "handle" });
+    previewer = new Previewer(picture, "surface", Promise.resolve({} as WebAssembly.Module), made.store);
+    previewer.prepare();
+    await settled();
+    StandIn.last.answer(SURFACE);
+  });
+
+  it("is coloured where it is broken, also in the shapes that come until the next look", () => {
+    drag(1);
+    expect([ghost.coordinates?.[0], broken()]).toEqual([1, []]);
+    judge(1);
+    expect([broken(), made.store.state.preview.brokenIn]).toEqual([[3, 0, 2, 3], ["throat"]]);
+    drag(2);
+    expect([ghost.coordinates?.[0], broken()]).toEqual([2, [3, 0, 2, 3]]);
+    judge(0);
+    expect(broken()).toEqual([3, 0, 1, 2]);
+    drag(3);
+    judge();
+    expect([ghost.coordinates?.[0], broken(), made.store.state.preview.faults]).toEqual([3, [], ""]);
+  });
+
+  it("begins sound again after what was broken is given up", () => {
+    drag(1);
+    judge(1);
+    made.store.dispatch({ type: "cleared" });
+    expect([ghost.coordinates, broken()]).toEqual([null, []]);
+    drag(2);
+    expect([ghost.coordinates?.[0], broken()]).toEqual([2, []]);
+  });
+
+  it("has the skeleton in it, which goes back with what is given up", () => {
+    previewer.showSkeleton(true);
+    StandIn.last.answer({ skeleton: "s", bones: BONES });
+    expect(bones?.preview).toBeNull();
+    drag(1);
+    expect([...bones!.preview!]).toEqual([1, 0, 0, 2, 0, 0]);
+    expect([bones!.now, bones!.curves]).toEqual([BONES.now, BONES.curves]);
+    drag(2);
+    expect([...bones!.preview!]).toEqual([2, 0, 0, 3, 0, 0]);
+    made.store.dispatch({ type: "cleared" });
+    expect(bones).toEqual(BONES);
+    // One that is not shown follows nothing.
+    previewer.showSkeleton(false);
+    drag(3);
+    expect(bones).toBeNull();
   });
 });
 
