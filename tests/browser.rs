@@ -1,7 +1,7 @@
-//! The viewer in a headless browser: the demo, what can be seen and how, before and after compared,
-//! shaping by hand, a first day, pipelines changed, a shape changed by two people over an encrypted line,
-//! several people together, runs behind a relay and a proxy, the viewer in a page of others, the end of a
-//! run, and a recording.
+//! The viewer in a headless browser: the demo, the demonstrations of the paper, what can be seen and how,
+//! before and after compared, shaping by hand, a first day, pipelines changed, a shape changed by two people
+//! over an encrypted line, several people together, runs behind a relay and a proxy, the viewer in a page of
+//! others, the end of a run, and a recording.
 
 use std::path::Path;
 use std::process::Command;
@@ -93,6 +93,134 @@ fn shaping_by_hand_in_a_browser() {
 #[test]
 fn a_first_day_in_a_browser() {
     watch("tasks.mjs", "bypass", "bypass-0");
+}
+
+/// The whole of a demonstration of the paper in a browser, on a mesh that such a browser draws with
+/// ease. What the page shows in the end is what the report of the run says.
+fn demonstrate(name: &str, mesh: &str) {
+    let directory = tempfile::TempDir::new().expect("a temporary directory");
+    let path = |file: &str| {
+        directory
+            .path()
+            .join(file)
+            .to_str()
+            .expect("a temporary directory has a plain name")
+            .to_owned()
+    };
+    let read = |path: &Path| -> Value {
+        let text = std::fs::read_to_string(path).expect("a file");
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let example = |kind: &str| read(&project().join(format!("examples/flow/{kind}/{name}.json")));
+    let mut case = example("cases");
+    case["mesh"] = generated_mesh(mesh).to_str().expect("text").into();
+    let mut pipelines = example("pipelines");
+    for pipeline in pipelines["pipelines"].as_array_mut().expect("pipelines") {
+        // A small mesh takes its steps faster than a browser draws.
+        if let Some(steps) = pipeline.pointer_mut("/every/steps") {
+            *steps = 50.into();
+        }
+    }
+    for (file, content) in [("case.json", case), ("pipelines.json", pipelines)] {
+        std::fs::write(path(file), content.to_string()).expect("written");
+    }
+    let files = [
+        ("--case", "case.json"),
+        ("--pipelines", "pipelines.json"),
+        ("--report", "report.json"),
+        ("--out", "out"),
+    ];
+    let mut arguments: Vec<String> =
+        files.into_iter().flat_map(|(option, file)| [option.to_owned(), path(file)]).collect();
+    // A core is left to the browser.
+    arguments.extend(["--listen", "127.0.0.1:0", "--threads", "1"].map(str::to_owned));
+    let mut run = Run::flow(&arguments);
+    let url = run.link().url();
+    let variables =
+        [("TOMBOLO_DEMONSTRATION", name.to_owned()), ("TOMBOLO_SHOWN", path("shown.json"))];
+    drive_at("paper.mjs", &url, &run, &variables);
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let [shown, report] = ["shown.json", "report.json"].map(|file| read(Path::new(&path(file))));
+    assert_page_agrees(&shown, &report);
+}
+
+/// Whether a page shows a number, rounded to so many digits, or one less beside a power of ten. What
+/// stands behind the number is passed over.
+fn shows(text: &str, value: f64, digits: i32) -> bool {
+    let number: String = text
+        .replace('−', "-")
+        .chars()
+        .take_while(|&letter| letter.is_ascii_digit() || "-.e".contains(letter))
+        .collect();
+    let unit = if value == 0.0 { 0.0 } else { 10f64.powf(value.abs().log10().floor() + 1.0) };
+    let half = 0.5 * unit * 10f64.powi(i32::from(number.contains('e')) - digits);
+    number.parse::<f64>().is_ok_and(|shown| (shown - value).abs() <= half * (1.0 + 1e-9))
+}
+
+/// Compares the numbers that a page shows of a run that has ended with those of its report.
+fn assert_page_agrees(shown: &Value, report: &Value) {
+    let assert_shown = |what: &str, text: &Value, value: &Value, digits: i32| {
+        let agrees =
+            shows(text.as_str().unwrap_or_default(), value.as_f64().unwrap_or(f64::NAN), digits);
+        assert!(agrees, "{what}: the page shows {text}, the report says {value}");
+    };
+    let cycles = &report["cycles"];
+    assert_eq!(shown["cycle"], cycles.to_string());
+    let banner = shown["banner"].as_str().expect("text");
+    assert!(
+        banner.starts_with(&format!("The run ended at cycle {cycles}: stopped.")),
+        "the page says \"{banner}\", the report {cycles} cycles"
+    );
+    assert_shown("the time", &shown["time"], &report["time"], 5);
+
+    let last = |name: &str| -> Value {
+        let pipelines = report["pipelines"].as_array().expect("pipelines");
+        let monitors = pipelines.iter().flat_map(|pipeline| pipeline["monitors"].as_array());
+        let monitor = monitors.flatten().find(|monitor| monitor["name"] == name);
+        monitor.unwrap_or_else(|| panic!("the report has no {name}"))["last"].clone()
+    };
+    assert_shown("the least quality", &shown["quality"], &last("quality.min"), 3);
+    for (place, label, name) in [
+        ("monitors", "Quality, minimum", "quality.min"),
+        ("monitors", "Quality, mean", "quality.mean"),
+        ("monitors", "Velocity, maximum", "velocity.max"),
+        ("monitors", "Inlet, mean", "inlet.mean"),
+        ("monitors", "Outlet, flow rate", "outlet.flow_rate"),
+        ("monitors", "Pressure drop", "pressure drop"),
+        ("dock", "Quality, minimum", "quality.min"),
+        ("dock", "Pressure drop [Pa]", "pressure drop"),
+    ] {
+        assert_shown(label, &shown[place][label], &last(name), 4);
+    }
+
+    let [rows, orders] = [shown, report].map(|both| both["orders"].as_array().expect("orders"));
+    assert!(rows.len() == orders.len() && orders.len() >= 2, "{shown}\n{report}");
+    for (row, order) in rows.iter().zip(orders) {
+        assert_eq!((&row["id"], &order["status"]), (&order["id"], &"applied".into()));
+        let detail = row["detail"].as_str().expect("text");
+        let part = |start: &str| -> Value {
+            detail.split(" · ").find_map(|part| part.strip_prefix(start)).into()
+        };
+        assert_eq!(part("at cycle "), order["cycle_applied"].to_string(), "{detail}");
+        let quality = &order["min_scaled_jacobian"];
+        assert_shown("the quality of an order", &part("quality "), quality, 3);
+        // What was taken back was not foretold.
+        if let Some(forecast) = row["forecast"].as_str() {
+            let foretold = forecast.strip_prefix("Forecast: least quality ");
+            assert_shown("the forecast", &foretold.into(), quality, 3);
+        }
+    }
+    assert!(rows.iter().any(|row| row["forecast"].is_string()), "{shown}");
+}
+
+/// Each by another means: the nozzle by the keyboard, the bypass by the mouse, the pipe by touch.
+#[test]
+fn the_demonstrations_of_the_paper_in_a_browser() {
+    let _alone = alone();
+    for (name, mesh) in [("nozzle", "channel-5k"), ("bypass", "bypass-8k"), ("pipe", "pipe-4k")] {
+        demonstrate(name, mesh);
+    }
 }
 
 /// A small nozzle that is streamed by these settings, with these options besides.

@@ -160,6 +160,79 @@ export class Viewer {
   }
 }
 
+/** What one finger or two do on a page that has touch: told to the browser, which makes of it what it makes of a real one. */
+export class Fingers {
+  constructor(viewer) {
+    this.page = viewer.page;
+    this.session = viewer.page.context().newCDPSession(viewer.page);
+  }
+
+  async touch(type, places) {
+    const touchPoints = places.map(([x, y], id) => ({ x, y, id }));
+    await (await this.session).send("Input.dispatchTouchEvent", { type, touchPoints });
+  }
+
+  /** Taps a place of the page, or an element once it has been brought into sight. */
+  async tap(where) {
+    if (Array.isArray(where)) await this.page.touchscreen.tap(...where);
+    else await this.page.locator(where).tap();
+  }
+
+  /** Goes from a place of the page by so much. */
+  async drag(from, by) {
+    await this.spread([from], [by]);
+  }
+
+  /** Each finger goes from its place of the page by so much, all at once. */
+  async spread(from, by, parts = 6) {
+    await this.touch("touchStart", from);
+    for (let part = 1; part <= parts; part++) await this.touch("touchMove", from.map((place, i) => place.map((value, k) => value + (by[i][k] * part) / parts)));
+    await this.touch("touchEnd", []);
+  }
+
+  /** Writes into a field as the keyboard of a screen does: the text comes, and no keys. */
+  async write(selector, text) {
+    await this.tap(selector);
+    await this.page.locator(selector).fill(String(text));
+  }
+}
+
+/** What is done by keys alone. */
+export class Keys {
+  constructor(viewer) {
+    this.page = viewer.page;
+  }
+
+  async press(...keys) {
+    for (const key of keys) await this.page.keyboard.press(key);
+  }
+
+  /** Goes on by a key, such as Tab, until an element has the focus that matches. */
+  async to(selector, key = "Tab") {
+    for (let presses = 0; presses < 300; presses++) {
+      await this.page.keyboard.press(key);
+      if (await this.page.evaluate((wanted) => document.activeElement?.matches(wanted) === true, selector)) return;
+    }
+    throw new Failure(`${key} does not reach ${selector}`);
+  }
+
+  /** Writes into the field that has the focus, in place of what stands there. */
+  async write(text) {
+    await this.press("Control+a");
+    await this.page.keyboard.type(String(text));
+  }
+}
+
+/** Keeps count of the pointers and keys that a page is told of, from when it is opened: `meansUsed` reads it. */
+export function countMeans({ page }) {
+  return page.addInitScript(() => {
+    window.means = {};
+    const count = ({ pointerType, isTrusted }) => { if (isTrusted) window.means[pointerType ?? "key"] = (window.means[pointerType ?? "key"] ?? 0) + 1; };
+    for (const type of ["pointerdown", "keydown"]) window.addEventListener(type, count, true);
+  });
+}
+export const meansUsed = ({ page }) => page.evaluate(() => Object.keys(window.means).sort().join(", "));
+
 /** Runs steps; ends the process's exit code with 1 where one fails. */
 export async function run(steps, viewers, close) {
   for (const [name, step] of steps) {
