@@ -21,6 +21,18 @@ const told = () => first.until("the forecast", ({ forecast }) => {
   check(forecast.state !== "failed", `there is no forecast: ${forecast.reason}`);
   return forecast.state === "told";
 });
+/** Does what gives an order, and waits until that has come to its end. */
+const given = async (act) => {
+  const known = new Set((await first.look()).orders.map((order) => order.id));
+  await act();
+  return first.settled(known);
+};
+/** Takes the only edit back. */
+const takenBack = async () => {
+  await first.until("an edit to take back", (now) => now.stack.length === 1);
+  check((await given(() => page.click("#undo"))).status === "applied", "it cannot be taken back");
+  await first.until("no edit", (now) => now.stack.length === 0);
+};
 /** Waits until the list of edits has these rows: the edits are fetched once the run has told of them. */
 const listed = (...rows) => first.holds(`the list of ${rows.length} edits: ${rows.join("; ")}`, (wanted) =>
   JSON.stringify([...document.querySelectorAll("#stack .title")].map((title) => title.textContent)) === JSON.stringify(wanted), rows);
@@ -97,13 +109,46 @@ const steps = [
     await page.locator("#amount").fill("100");
     check(Math.abs(Number(await first.field("factors z").inputValue()) - filled) < 0.011, `the slider went on to ${await first.field("factors z").inputValue()}`);
     await first.picture("filled-in");
-    await factor("z", 0.01);
-    await told();
+    const passed = await given(() => page.click("#apply"));
+    const asked = passed.order.edits[0].scale_direction.factors[2];
+    check(passed.status === "applied" && Math.abs(asked - filled) < 1e-4 && passed.order.guard === undefined, `${offered} was ${passed.status}, with the factor ${asked}`);
+    await first.until("the throat as low as would pass", async () => Math.abs((await first.extent("throat", 2)) / first.whole - asked) < 0.005);
+    await takenBack();
+    console.log(`    refused at 0.01: ${offered}, applied with ${asked}`);
+  }],
+  ["what can be untangled is applied untangled", async () => {
+    await page.selectOption("#action", "rotate");
+    await first.field("degrees").fill("120");
+    check((await told()).forecast.outcome === "rejected", "half a turn and more passes as it is");
     await page.click("#untangle");
-    const mended = await told();
-    console.log(`    refused at 0.01: ${offered}, filled in ${filled}; untangled: ${mended.forecast.outcome}, quality ${mended.forecast.min}`);
+    const { forecast } = await told();
+    check(forecast.outcome === "applied" && forecast.inverted === 0, `untangled it is ${JSON.stringify(forecast)}`);
     check(await page.locator("#untangle").isHidden(), "Untangle is offered again");
-    await page.click("#cancel");
+    const order = await given(() => page.click("#apply"));
+    check(order.status === "applied" && order.order.guard.otherwise === "untangle", `the order ${JSON.stringify(order.order)} was ${order.status}: ${order.reason}`);
+    check(Math.abs(order.min_scaled_jacobian - forecast.min) < 1e-3, `a quality of ${forecast.min} was foretold, it is ${order.min_scaled_jacobian}`);
+    await first.picture("untangled");
+    await takenBack();
+  }],
+  ["an order that the run refuses says so in its row, and changes nothing", async () => {
+    await page.selectOption("#action", "scale_direction");
+    // Before anything could have been foretold.
+    const order = await given(() => page.evaluate(() => {
+      const field = document.querySelector('.object:not([hidden]) input[aria-label="factors z"]');
+      field.value = "0.01";
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+      document.getElementById("apply").click();
+    }));
+    check(order.status === "rejected" && order.fraction > 0.9, `the order was ${order.status}`);
+    await first.holds("the row of the refused order", (id) => {
+      const row = document.querySelector(`#pending [data-order="${id}"]`);
+      return row?.dataset.status === "rejected" && row.querySelector(".chip").textContent === "refused" && /would fall under the scaled Jacobian of|would be turned inside out/.test(row.querySelector(".detail").textContent);
+    }, order.id);
+    await first.picture("refused-by-the-run");
+    check(Math.abs((await first.extent("throat", 2)) / first.whole - 1) < 0.005 && (await first.look()).stack.length === 0, "a refused order has changed the shape");
+    check((await first.field("factors z").inputValue()) === "1", "the form still asks for what was refused");
+    await page.click(`#pending [data-order="${order.id}"] [aria-label^="Dismiss"]`);
+    await first.holds("the row gone", () => document.querySelectorAll("#pending li").length === 0);
   }],
   ["an edit is applied once, however often Apply is pressed", async () => {
     await factor("z", 0.7);
