@@ -27,6 +27,13 @@ const given = async (act) => {
   await act();
   return first.settled(known);
 };
+/** Sets how many shapes an order has, and the steps between them. */
+const scheduled = async (shapes, every) => {
+  const steps = page.getByLabel("schedule steps", { exact: true });
+  if (!(await steps.isVisible())) await page.click(".schedule summary");
+  await steps.fill(String(shapes));
+  await page.getByLabel("schedule every", { exact: true }).first().fill(String(every));
+};
 /** Takes the only edit back. */
 const takenBack = async () => {
   await first.until("an edit to take back", (now) => now.stack.length === 1);
@@ -147,6 +154,20 @@ const steps = [
     await first.picture("refused-by-the-run");
     check(Math.abs((await first.extent("throat", 2)) / first.whole - 1) < 0.005 && (await first.look()).stack.length === 0, "a refused order has changed the shape");
     check((await first.field("factors z").inputValue()) === "1", "the form still asks for what was refused");
+    // Back into the form: all of it, and as much as would pass.
+    await page.click(`#pending [data-order="${order.id}"] [data-act="again"]`);
+    check((await first.field("factors z").inputValue()) === "0.01", "the form has not what was refused");
+    check((await told()).forecast.outcome === "rejected", "what was refused is foretold to pass");
+    await page.click("#cancel");
+    const way = page.locator(`#pending [data-order="${order.id}"] [data-act="part"]`);
+    const offered = await way.innerText();
+    check(/^Apply 9\d %$/.test(offered), `the row offers "${offered}"`);
+    await way.click();
+    await told();
+    const part = await given(() => page.click("#apply"));
+    const asked = part.order.edits[0].scale_direction.factors[2];
+    check(part.status === "applied" && Math.abs(1 - asked - 0.99 * order.fraction) < 0.002, `${offered} was ${part.status}, with the factor ${asked}`);
+    await takenBack();
     await page.click(`#pending [data-order="${order.id}"] [aria-label^="Dismiss"]`);
     await first.holds("the row gone", () => document.querySelectorAll("#pending li").length === 0);
   }],
@@ -161,6 +182,50 @@ const steps = [
     await listed("Throat: height × 0.7");
     await first.until("the pinch in the picture", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.7) < 0.005);
     await first.picture("applied");
+  }],
+  ["an order is not lost when the page is loaded again, planned or on its way", async () => {
+    await first.until("the pinch", (now) => now.stack.length === 1);
+    const client = await page.evaluate(() => window.tombolo.client);
+    const known = new Set((await first.look()).orders.map((order) => order.id));
+    const own = ({ orders }) => orders.filter(({ id }) => !known.has(id));
+    /** Loads the page again while the run rests: whoever steered steers, and the row of the order says how it stands. */
+    const again = async (said) => {
+      await page.reload();
+      const seen = await first.until("the page again", (now) => now.connection === "connected" && now.frames > 0 && now.status?.paused === true && now.orders.length > known.size);
+      check(seen.role === "driver" && (await page.evaluate(() => window.tombolo.client)) === client, `the page that was loaded again is a ${seen.role}`);
+      check(own(seen).length === 1, `after it there are the orders ${JSON.stringify(own(seen))}`);
+      const [{ id, status }] = own(seen);
+      const row = page.locator(`#pending [data-order="${id}"]`);
+      check((await row.count()) === 1 && (await row.getAttribute("data-status")) === status && said.test(await row.innerText()), `the order is ${status}, its row says "${await row.allInnerTexts()}"`);
+      return row;
+    };
+    const rests = async (paused) => {
+      await page.click("#pause");
+      await first.until(paused ? "the run paused" : "the run going on", (now) => now.status?.paused === paused);
+    };
+    await rests(true);
+    await page.selectOption("#action", "translate");
+    await first.field("by y").fill("0.02");
+    await scheduled(20, 100);
+    await told();
+    await page.click("#apply");
+    await first.until("the order planned", (now) => own(now).some(({ status }) => status === "accepted" || status === "computing"));
+    await again(/Throat: moved by 0\.02 along y[^]*(waiting|computing)/);
+    await first.picture("planned");
+    await rests(false);
+    await first.until("the first shapes", (now) => own(now).some(({ status, shape }) => status === "applying" && shape >= 1));
+    await rests(true);
+    const row = await again(/Throat: moved by 0\.02 along y[^]*shape \d+ of 20/);
+    const part = await row.locator(".bar div").evaluate((bar) => bar.getBoundingClientRect().width / bar.parentElement.getBoundingClientRect().width);
+    check(part > 0 && part < 1, `the bar is filled to ${part}`);
+    await first.picture("on-its-way");
+    await rests(false);
+    const seen = await first.until("the order applied", (now) => own(now).every(({ status }) => status === "applied"));
+    check(own(seen).length === 1 && seen.stack.length === 2, `there are the orders ${JSON.stringify(own(seen))} and the edits ${JSON.stringify(seen.stack)}`);
+    await listed("Throat: height × 0.7", "Throat: moved by 0.02 along y");
+    check((await given(() => page.click("#undo"))).status === "applied", "it cannot be taken back");
+    await first.until("the pinch alone", (now) => now.stack.length === 1);
+    await scheduled(2, 1);
   }],
   ["the first of two edits is changed, and the second follows", async () => {
     await page.selectOption("#action", "translate");
