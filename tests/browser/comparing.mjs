@@ -16,10 +16,6 @@ const { page } = viewer;
 const rows = () => page.evaluate(() => [...document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")));
 /** The numbers of a row of the table beside the plot. */
 const numbers = (row) => row.split("\t").slice(1).map((text) => Number(text.trim().replace("−", "-")));
-const clean = async (what) => {
-  const found = await viewer.violations();
-  check(found.length === 0, `${what}: ${found.join("; ")}`);
-};
 const setLook = async (field) => {
   await page.locator("#look select").first().selectOption(field);
 };
@@ -61,7 +57,7 @@ const steps = [
     const ends = await page.evaluate(() => [...document.querySelectorAll("#dock .ends input")].map((input) => Number(input.value.replace("−", "-"))));
     check(ends[1] < 0 && ends[4] > 0 && ends[4] - ends[1] > 0.2, `the line goes from and to ${ends}`);
     await viewer.picture("line");
-    await clean("with the line");
+    await viewer.clean("with the line");
     // Exactly along the axis, by numbers.
     for (const [label, value] of [["from x", 0], ["from y", -0.5], ["from z", 0], ["to x", 0], ["to y", 0.5], ["to z", 0]]) {
       await page.getByLabel(label, { exact: true }).fill(String(value));
@@ -88,12 +84,12 @@ const steps = [
     await viewer.picture("line-before-and-now");
     await page.getByRole("tab", { name: "Histogram" }).click();
     await viewer.holds("both histograms", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 2);
-    await clean("with the histogram");
+    await viewer.clean("with the histogram");
     await page.click("#compare");
     await viewer.drawn();
     check(/^before “Throat: height × 0\.7”/.test(await viewer.text("#before .caption")), "the other picture does not say what it came before");
     await viewer.picture("compared", "compared.png");
-    await clean("side by side");
+    await viewer.clean("side by side");
     const [left, right, bars] = await page.evaluate(() => [".before-scene", "#scene", "#bars"].map((selector) => document.querySelector(selector).getBoundingClientRect().toJSON()));
     check(Math.abs(left.width - right.width) < 4, `the pictures are ${left.width} and ${right.width} wide`);
     check(bars.left >= right.right, `the bars begin at ${bars.left}, the picture of now ends at ${right.right}`);

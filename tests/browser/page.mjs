@@ -86,6 +86,23 @@ export class Viewer {
     return this.page.evaluate(() => window.tombolo.picture());
   }
 
+  /** How many pixels of the picture, without what lies over it, are about of a colour; all that has come is drawn before. */
+  async pixelsOf(colour, tolerance = 40) {
+    await this.drawn();
+    const png = (await this.page.locator("#scene").screenshot({ style: "#stage > :not(#scene), #tools { visibility: hidden }" })).toString("base64");
+    return this.page.evaluate(async ([data, wanted, most]) => {
+      const image = Object.assign(new Image(), { src: `data:image/png;base64,${data}` });
+      await image.decode();
+      const canvas = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height });
+      const context = canvas.getContext("2d");
+      context.drawImage(image, 0, 0);
+      const pixels = context.getImageData(0, 0, image.width, image.height).data;
+      let count = 0;
+      for (let at = 0; at < pixels.length; at += 4) if (wanted.every((part, k) => Math.abs(pixels[at + k] - part) <= most)) count++;
+      return count;
+    }, [png, colour, tolerance]);
+  }
+
   text(selector) {
     return this.page.locator(selector).innerText();
   }
@@ -119,7 +136,13 @@ export class Viewer {
     });
   }
 
-  /** Keeps what the page looks like at three sizes, with a drawer open where the page is narrow; nobody is kept out of it. */
+  /** Checks that axe finds nothing wrong with the page as it is. */
+  async clean(state) {
+    const found = await this.violations();
+    check(found.length === 0, `${this.name}, ${state}: axe finds ${found.join("; ")}`);
+  }
+
+  /** Keeps what the page looks like at three sizes, with a drawer open where the page is narrow; nobody is kept out of any. */
   async filmed(name, drawer = null) {
     for (const [width, height] of SIZES) {
       await this.page.setViewportSize({ width, height });
@@ -127,10 +150,9 @@ export class Viewer {
       if (isNarrow && drawer) await this.page.click(`#${drawer}-drawer`);
       await this.drawn();
       await this.picture(`${name}-${width}`);
+      await this.clean(`${name} at ${width} x ${height}`);
       if (isNarrow && drawer) await this.page.click(`#${drawer}-drawer`);
     }
-    const found = await this.violations();
-    check(found.length === 0, `${name}: ${found.join("; ")}`);
   }
 
   /** A number of the edit that is in the form. */

@@ -133,8 +133,7 @@ const steps = [
   }],
   ["nobody is kept out, in light and in dark", async () => {
     for (const theme of ["light", "dark"]) {
-      const found = await viewer.violations();
-      check(found.length === 0, `${theme}: ${found.join("; ")}`);
+      await viewer.clean(`in ${theme}`);
       await page.click("#theme");
     }
     const small = await page.evaluate(() => [...document.querySelectorAll("button, input:not([type=checkbox]), select, summary")]

@@ -17,10 +17,6 @@ const now = (viewer) => viewer.page.evaluate(() => {
   return { people, notes, following, camera };
 });
 const known = (viewer, what, condition, argument) => viewer.holds(what, condition, argument);
-const clean = async (viewer, state) => {
-  const found = await viewer.violations();
-  check(found.length === 0, `${viewer.name}, ${state}: axe finds ${found.join("; ")}`);
-};
 /** The link that a button of the page has copied. */
 const copied = async (viewer, button) => {
   await viewer.page.evaluate(() => navigator.clipboard.writeText(""));
@@ -52,7 +48,7 @@ const steps = [
     const steering = await copied(anna, "#link-drive");
     const watching = await copied(anna, "#link-watch");
     await anna.picture("links");
-    await clean(anna, "with links");
+    await anna.clean("with links");
     for (const address of [steering, watching]) check(new RegExp(`^${new URL(link).origin}/\\?key=[0-9a-f]{32}$`).test(address), `the link is ${address}`);
     bo = await opened("bo", steering, { width: 1920, height: 1080 });
     carl = await opened("carl", watching, { width: 820, height: 1180 });
@@ -74,7 +70,7 @@ const steps = [
     const selected = await carl.page.evaluate(() => window.getSelection().toString() || document.activeElement.value.slice(document.activeElement.selectionStart, document.activeElement.selectionEnd));
     check(/\?key=[0-9a-f]{32}$/.test(selected), `"${selected}" is selected`);
     await carl.picture("link-shown");
-    await clean(carl, "with a link shown");
+    await carl.clean("with a link shown");
     await carl.page.keyboard.press("Escape");
     check(await carl.page.inputValue("#link-text") === "", "the link is left there");
     check(await carl.page.evaluate(() => document.activeElement.id) === "viewers", "the focus is lost with the panel");
@@ -97,7 +93,7 @@ const steps = [
     await known(bo, "that the answer is waited for", () => !document.getElementById("waiting").hidden && /is told that you ask/.test(document.getElementById("waiting").textContent));
     check(await bo.page.locator("#refusal").isHidden(), "to have to wait counts as an error");
     await anna.picture("people");
-    await clean(anna, "asked");
+    await anna.clean("asked");
     await anna.page.click('#people-list li:nth-child(2) [data-act="hand-over"]');
     await bo.until("the wheel", (seen) => seen.role === "driver");
     check(await bo.page.locator("#waiting").isHidden(), "an answer is still waited for");
@@ -127,7 +123,7 @@ const steps = [
     const before = (await now(bo)).camera;
     await carl.picture("follows");
     await anna.picture("is-followed");
-    await clean(carl, "following");
+    await carl.clean("following");
     await carl.page.focus("#scene");
     await carl.page.keyboard.press("ArrowLeft");
     await known(carl, "following no more", () => !window.tombolo.following && !document.getElementById("follow").checked);
@@ -166,7 +162,7 @@ const steps = [
     check(await anna.page.locator("#marks circle.note").count() === 2, "the pins are not in the picture");
     await anna.picture("notes");
     await bo.picture("notes");
-    await clean(anna, "with notes");
+    await anna.clean("with notes");
     await carl.page.click("#left-drawer");
     check(await carl.page.locator("#note-form").isHidden() && await carl.page.locator('#notes [data-act="remove"]').count() === 0, "one who watches can write notes");
     const before = (await now(carl)).camera;
@@ -174,7 +170,7 @@ const steps = [
     await known(carl, "the camera at the note", (at) => JSON.stringify(window.tombolo.camera.focalPoint) === JSON.stringify(at), note.at);
     check(JSON.stringify(before) !== JSON.stringify((await now(carl)).camera), "the camera did not move");
     await carl.picture("note-flown-to");
-    await clean(carl, "with notes in a drawer");
+    await carl.clean("with notes in a drawer");
     // One who comes later sees them.
     await bo.page.reload();
     await known(bo, "the notes after a reload", () => window.tombolo?.notes.length === 2);
