@@ -42,7 +42,7 @@ export class ViewList {
       type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
     }, name, element("small", { class: "kind" }));
     visible.setAttribute("aria-label", `${name}: shown`);
-    return element("div", { class: "view", "data-view": name }, visible, chosen, opacity, element("small", { class: "precision", role: "status" }));
+    return element("div", { class: "view", "data-view": name }, element("label", { class: "shown" }, visible), chosen, opacity, element("small", { class: "precision", role: "status" }));
   }
 
   private show(): void {
