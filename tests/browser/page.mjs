@@ -48,7 +48,10 @@ export class Viewer {
   /** `options` are those of a browser context, such as its viewport. */
   static async open(browser, name, options = {}) {
     const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
-    return new Viewer(name, await context.newPage());
+    const viewer = new Viewer(name, await context.newPage());
+    // What the page's own policy has refused counts as a complaint, with the rule that it broke.
+    await viewer.page.addInitScript(() => document.addEventListener("securitypolicyviolation", ({ effectiveDirective, blockedURI }) => console.error(`the policy "${effectiveDirective}" has refused ${blockedURI}`)));
+    return viewer;
   }
 
   constructor(name, page) {
@@ -101,6 +104,18 @@ export class Viewer {
       for (let at = 0; at < pixels.length; at += 4) if (wanted.every((part, k) => Math.abs(pixels[at + k] - part) <= most)) count++;
       return count;
     }, [png, colour, tolerance]);
+  }
+
+  /** The controls that are lower or narrower than the 24 pixels that a finger needs; what has a label can be met there too. */
+  small() {
+    return this.page.evaluate(() => [...document.querySelectorAll("button, input, select, textarea, summary, [role=tab], a[href]")]
+      .filter((control) => control.checkVisibility({ visibilityProperty: true }) && !control.classList.contains("skip"))
+      .flatMap((control) => {
+        const boxes = [control, ...(control.labels ?? [])].map((part) => part.getBoundingClientRect());
+        const width = Math.max(...boxes.map(({ right }) => right)) - Math.min(...boxes.map(({ left }) => left));
+        const height = Math.max(...boxes.map(({ bottom }) => bottom)) - Math.min(...boxes.map(({ top }) => top));
+        return width < 24 || height < 24 ? [`${control.id || control.getAttribute("aria-label") || control.textContent} ${Math.round(width)} x ${Math.round(height)}`] : [];
+      }));
   }
 
   text(selector) {
