@@ -14,12 +14,22 @@ const viewer = await Viewer.open(browser, "comparing", { acceptDownloads: true }
 const { page } = viewer;
 // Read in one go: the run goes on, and with it what the table says.
 const rows = () => page.evaluate(() => [...document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr")].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t")));
+const numberOf = (text) => Number(text.trim().replace("−", "-"));
 /** The numbers of a row of the table beside the plot. */
-const numbers = (row) => row.split("\t").slice(1).map((text) => Number(text.trim().replace("−", "-")));
+const numbers = (row) => row.split("\t").slice(1).map(numberOf);
+/** What is downloaded when a button is pressed. */
+const saved = async (name) => {
+  const waiting = page.waitForEvent("download");
+  await page.getByRole("button", { name, exact: true }).click();
+  const file = await waiting;
+  const path = await file.path();
+  return { name: file.suggestedFilename(), path };
+};
 const setLook = async (field) => {
   await page.locator("#look select").first().selectOption(field);
 };
 
+const shared = {};
 const steps = [
   ["a slice is dragged along its normal in the picture", async () => {
     await page.goto(link);
@@ -70,8 +80,24 @@ const steps = [
     await page.check('input[aria-label="throat: handle"]');
     await viewer.field("factors z").fill("0.7");
     await viewer.until("the forecast", ({ forecast }) => forecast.state === "told");
-    const order = await viewer.apply();
+    // Every range that the bar shows while the order changes the shape.
+    await page.evaluate(() => {
+      window.ranges = new Set();
+      const watching = setInterval(() => {
+        const status = window.tombolo.orders.at(-1)?.status;
+        if (status === "applying") window.ranges.add([...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to "));
+        else if (status === "applied") clearInterval(watching);
+      }, 20);
+    });
+    await page.click("#apply");
+    await viewer.until("the order under way", ({ orders }) => orders.length === 1 && orders[0].status !== "sent");
+    await viewer.clean("with an order under way");
+    const order = await viewer.settled(new Set());
     check(order.status === "applied", `the pinch was refused: ${order.reason}`);
+    const ranges = await page.evaluate(() => [...window.ranges]);
+    check(ranges.length === 1, `while the order was under way the range was ${ranges.join(", then ") || "not seen"}`);
+    await viewer.holds("another range after it", (before) => [...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to ") !== before, ranges[0]);
+    shared.order = order;
     await viewer.holds("both profiles", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 2);
     // The throat is narrower, so the flow is faster in it, and more pressure is needed to drive it.
     await viewer.holds("more pressure than before", () => {
@@ -93,6 +119,50 @@ const steps = [
     const [left, right, bars] = await page.evaluate(() => [".before-scene", "#scene", "#bars"].map((selector) => document.querySelector(selector).getBoundingClientRect().toJSON()));
     check(Math.abs(left.width - right.width) < 4, `the pictures are ${left.width} and ${right.width} wide`);
     check(bars.left >= right.right, `the bars begin at ${bars.left}, the picture of now ends at ${right.right}`);
+  }],
+  ["the history has values, what they were before and the difference under the pointer, in numbers that a file has too", async () => {
+    await page.getByRole("tab", { name: "History" }).click();
+    const over = page.locator("#dock .dock-body:not([hidden]) .u-over");
+    const { x, y, width, height } = await over.boundingBox();
+    /** What the table says with the pointer at a part of the width. */
+    const at = async (part) => {
+      await page.mouse.move(x + part * width, y + height / 2);
+      const read = () => page.evaluate(() => {
+        const body = document.querySelector("#dock .dock-body:not([hidden])");
+        const row = [...body.querySelectorAll("tbody tr")].find((one) => /^Pressure drop/.test(one.textContent));
+        return { title: body.querySelector(".table-title").textContent, cells: [...row.querySelectorAll("td")].map((cell) => cell.textContent), hint: row.querySelector("td:last-child").title };
+      });
+      return read();
+    };
+    const early = await at(0.02);
+    check(/^cycle \d+$/.test(early.title) && early.cells[1] === "–" && early.cells[2] === "–", `before the order it says ${JSON.stringify(early)}`);
+    const late = await at(0.99);
+    const { cycle } = late.title.match(/^cycle (?<cycle>\d+) · before: Throat: height × 0\.7$/)?.groups ?? {};
+    check(Number(cycle) > shared.order.cycle_applied, `after the order it says ${JSON.stringify(late)}`);
+    const [value, before] = late.cells.slice(0, 2).map(numberOf);
+    const [, plain, percent] = late.hint.match(/^\+(\S+) \(\+(\S+)\u00a0%\)$/) ?? [];
+    check(Math.abs(Number(plain) / (value - before) - 1) < 0.02 && Math.abs(Number(percent) / (100 * (value - before) / before) - 1) < 0.02 && late.cells[2] === `+${percent}\u00a0%`,
+      `the difference of ${value} and ${before} is "${late.cells[2]}", "${late.hint}"`);
+    await viewer.picture("history-hover");
+    const csv = await saved("CSV");
+    const [names, ...lines] = readFileSync(csv.path, "utf8").trim().split("\n").map((line) => line.split(","));
+    const column = names.findIndex((name) => /pressure drop/.test(name));
+    const line = lines.find(([first]) => first === cycle);
+    check(names[0] === "cycle" && names[1] === "time" && column > 1 && line, `${csv.name} has the columns ${names}, ${lines.length} lines and none of cycle ${cycle}`);
+    check(Number(Number(line[column]).toPrecision(4)) === value, `at cycle ${cycle} the file says ${line[column]}, the page ${value}`);
+    // A drag zooms to what is under it.
+    await page.mouse.move(x + 0.5 * width, y + height / 2);
+    await page.mouse.down();
+    await page.mouse.move(x + 0.8 * width, y + height / 2, { steps: 4 });
+    await page.mouse.up();
+    const whole = page.getByRole("button", { name: "Whole", exact: true });
+    check(await whole.isEnabled(), "a drag does not zoom");
+    const [first, last] = [await at(0.02), await at(0.98)].map(({ title }) => Number(title.match(/^cycle (\d+)/)[1]));
+    const all = [Number(early.title.match(/\d+/)[0]), Number(cycle)];
+    check(first > all[0] && last < all[1] + 50 && last - first < 0.6 * (all[1] - all[0]), `zoomed it goes from ${first} to ${last}, before from ${all[0]} to ${all[1]}`);
+    await whole.click();
+    check(Number((await at(0.02)).title.match(/^cycle (\d+)/)[1]) < first, "the whole is not there again");
+    console.log(`    cycle ${cycle}: ${late.cells.join(", ")}; ${csv.name}: ${lines.length} lines`);
   }],
   ["both pictures are seen from the same place", async () => {
     // The one of before is dragged, and the one of now turns with it.
@@ -152,12 +222,6 @@ const steps = [
     console.log(`    ${film.suggestedFilename()}, ${size} bytes`);
   }],
   ["edits go into a file and come back; the surface and the view go into files", async () => {
-    const saved = async (name) => {
-      const waiting = page.waitForEvent("download");
-      await page.getByRole("button", { name, exact: true }).click();
-      const file = await waiting;
-      return { name: file.suggestedFilename(), path: await file.path() };
-    };
     await page.click("#files summary");
     const { stack } = await viewer.look();
     const edits = await saved("Save edits");
@@ -165,6 +229,10 @@ const steps = [
     const surface = await saved("Surface (STL)");
     const triangles = readFileSync(surface.path).readUInt32LE(80);
     check(triangles > 1000 && statSync(surface.path).size === 84 + 50 * triangles, `${surface.name} has ${triangles} triangles`);
+    const moved = await saved("Displacement (CSV)");
+    const [heads, ...vertices] = readFileSync(moved.path, "utf8").trim().split("\n");
+    const largest = Math.max(...vertices.map((line) => Math.hypot(...line.split(",").slice(3).map(Number))));
+    check(heads === "x,y,z,dx,dy,dz" && Math.abs(largest / shared.order.largest_displacement - 1) < 1e-5, `by ${moved.name} the surface has moved by up to ${largest}, by the order ${shared.order.largest_displacement}`);
     const view = await saved("View (VTP)");
     check(/Name="pressure"/.test(readFileSync(view.path, "utf8")), `${view.name} has no pressure`);
     let known = new Set((await viewer.look()).orders.map((order) => order.id));
@@ -175,6 +243,18 @@ const steps = [
     await page.setInputFiles("#files input[type=file]", edits.path);
     check((await viewer.settled(known)).status === "applied", "the edits of the file were refused");
     await viewer.until("the edits of the file", (now) => JSON.stringify(now.stack) === JSON.stringify(stack));
+    // What is refused is listed with its reason.
+    known = new Set((await viewer.look()).orders.map((order) => order.id));
+    const folded = [...stack, { translate: { features: ["throat"], fixed: ["inlet", "outlet"], by: [0, 0.5, 0] } }];
+    await page.setInputFiles("#files input[type=file]", { name: "folded.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify({ stack: folded })) });
+    const refused = await viewer.settled(known);
+    check(refused.status === "rejected" && refused.reason, `edits that fold the wall are ${refused.status}`);
+    await viewer.holds("the refused order in the list", () => document.querySelector("#edits-panel .orders li")?.checkVisibility());
+    await viewer.picture("refused");
+    await viewer.clean("with a refused order");
+    await page.click('#stack [data-act="rename"]');
+    await viewer.clean("while an edit is renamed");
+    await page.keyboard.press("Escape");
     console.log(`    ${edits.name}, ${surface.name} (${triangles} triangles), ${view.name}`);
   }],
   ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
