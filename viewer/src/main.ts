@@ -22,7 +22,7 @@ import { HistoryPlot } from "./history/plot";
 import { Later } from "./later";
 import { pointed } from "./number";
 import { own } from "./own";
-import { ClickTools, OnePlace } from "./panels/click-tools";
+import { ClickTools, OnePlace, middleOf } from "./panels/click-tools";
 import type { ClickTool } from "./panels/click-tools";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
@@ -202,7 +202,7 @@ const placing = (button: string, isOn: () => boolean, toggle: () => void, take: 
     return place !== null;
   },
 });
-const clickTools = new ClickTools([
+const clickTools = new ClickTools(part("scene"), [
   ...([["ruler", ruler], ["line", line]] as const).map(([button, tool]) => placing(button, () => tool.active, () => tool.toggle(), (place) => tool.take(place))),
   placing("note", () => notes.choosing, () => notes.toggle(), (place) => notes.take(place)),
   new OnePlace("pin", pinAt),
@@ -252,10 +252,7 @@ const cameraTools = new CameraTools(part("tools"), scene);
 const reveal = watchDrawers();
 const notes: NotesPanel = new NotesPanel(store, commands, marks, {
   flyTo: (place) => scene.camera.flyTo(place),
-  middle: () => {
-    const { left, top, width, height } = part("scene").getBoundingClientRect();
-    return placeAt(left + width / 2, top + height / 2) ?? scene.camera.stand.focalPoint;
-  },
+  middle: () => placeAt(...middleOf(part("scene"))) ?? scene.camera.stand.focalPoint,
 }, reveal);
 /** What a view holds now. */
 function contentOf(view: string): Content | null {

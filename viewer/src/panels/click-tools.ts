@@ -1,5 +1,27 @@
-/** The tools that take the next click or tap in the picture in place of features: at most one is on, and its button says so. Escape leaves it. */
-import { part, textField } from "../dom";
+/**
+ * The tools that take the next click or tap in the picture in place of features: at most one is on, and its button says so. By the keyboard
+ * Enter takes the middle of the picture, to which the camera brings what one likes; Escape leaves the tool.
+ */
+import { part, textField, write } from "../dom";
+import { showTip } from "../picture/overlay";
+
+const NOTHING_THERE = "Nothing lies in the middle of the picture: turn or move it there.";
+
+/** The middle of an element, as a place of the page. */
+export function middleOf(element: HTMLElement): [number, number] {
+  const { left, top, width, height } = element.getBoundingClientRect();
+  return [left + width / 2, top + height / 2];
+}
+
+/** Takes the place in the middle of the picture, and says so where nothing is there. */
+export function takeMiddle(picture: HTMLElement, take: (clientX: number, clientY: number) => boolean): void {
+  const [x, y] = middleOf(picture);
+  const hasMet = take(x, y);
+  showTip(hasMet ? null : NOTHING_THERE, x, y);
+  // Said anew each time.
+  write(part("announcer"), "");
+  if (!hasMet) write(part("announcer"), NOTHING_THERE);
+}
 
 export interface ClickTool {
   /** The button that switches it on and off. */
@@ -11,8 +33,14 @@ export interface ClickTool {
 }
 
 export class ClickTools {
-  constructor(private readonly tools: readonly ClickTool[]) {
+  constructor(picture: HTMLElement, private readonly tools: readonly ClickTool[]) {
     for (const tool of tools) part(tool.button).addEventListener("click", () => this.use(tool.button));
+    picture.addEventListener("keydown", (event) => {
+      const take = this.taking();
+      if (event.key !== "Enter" || event.defaultPrevented || event.ctrlKey || event.metaKey || !take) return;
+      event.preventDefault();
+      takeMiddle(picture, take);
+    });
     window.addEventListener("keydown", (event) => {
       const { current } = this;
       if (event.key !== "Escape" || event.defaultPrevented || !current || textField(event.target)) return;

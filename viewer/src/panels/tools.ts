@@ -1,9 +1,9 @@
 /** The toolbar over the picture: the camera; and the theme of the page. */
 import { part, textField, write } from "../dom";
-import { showTip } from "../picture/overlay";
 import type { Scene } from "../picture/scene";
 import type { Theme } from "../picture/theme";
 import type { Kept } from "../store/kept";
+import { takeMiddle } from "./click-tools";
 
 /** Buttons with `data-camera`: the whole, along an axis (again from the other side), parallel projection. */
 export class CameraTools {
@@ -65,8 +65,6 @@ export class Theming {
   }
 }
 
-const NOTHING_THERE = "Nothing lies in the middle of the picture: turn or move it there.";
-
 export interface PictureTools {
   /** Plots what lies at a place of the page; returns whether that is the model. */
   pin(clientX: number, clientY: number): boolean;
@@ -95,20 +93,10 @@ export function watchPictureTools(picture: HTMLElement, stage: HTMLElement, tool
   part("full-screen").addEventListener("click", fullScreen);
   part("keys-button").addEventListener("click", () => keys.showModal());
   part("keys-close").addEventListener("click", () => keys.close());
-  /** Without a pointer it is the middle of the picture that is meant, to which the keys bring what one likes. */
-  const pinMiddle = (): void => {
-    const { left, top, width, height } = picture.getBoundingClientRect();
-    const [x, y] = [left + width / 2, top + height / 2];
-    const hasMet = tools.pin(x, y);
-    showTip(hasMet ? null : NOTHING_THERE, x, y);
-    // Said anew each time.
-    write(part("announcer"), "");
-    if (!hasMet) write(part("announcer"), NOTHING_THERE);
-  };
   const actions: Record<string, () => void> = {
     p: () => {
       if (pointer) tools.pin(pointer.x, pointer.y);
-      else pinMiddle();
+      else takeMiddle(picture, tools.pin);
     },
     P: () => tools.unpin(),
     m: () => tools.use("ruler"), l: () => tools.use("line"), n: () => tools.use("note"), s: () => tools.save(), f: fullScreen,

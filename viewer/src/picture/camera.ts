@@ -12,6 +12,8 @@ export interface Stand { position: Vector; focalPoint: Vector; viewUp: Vector; p
 /** How far what lies over the picture reaches into it from each side, as parts of its width and height. */
 export interface Covered { left: number; right: number; top: number; bottom: number }
 const NOTHING: Covered = { left: 0, right: 0, top: 0, bottom: 0 };
+/** What a key with shift moves what is seen by: to the right and up, as parts of the height of the picture. */
+const PANS: Readonly<Record<string, readonly [number, number]>> = { ArrowLeft: [-0.08, 0], ArrowRight: [0.08, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] };
 /** The part of the free room that the whole takes. */
 const FILLED = 0.9;
 
@@ -175,6 +177,20 @@ export class Camera {
     return [[Math.min(...x), Math.max(...x)], [Math.min(...y), Math.max(...y)]];
   }
 
+  /** Moves what is seen across the picture, by parts of its height to the right and up. */
+  private pan(right: number, up: number): void {
+    const camera = this.renderer.getActiveCamera();
+    const [from, to, above] = [camera.getPosition(), camera.getFocalPoint(), camera.getViewUp()];
+    const ahead = [0, 1, 2].map((k) => to[k]! - from[k]!);
+    const height = this.parallel ? 2 * camera.getParallelScale() : 2 * Math.hypot(...ahead) * Math.tan((camera.getViewAngle() * Math.PI) / 360);
+    const across = [0, 1, 2].map((k) => ahead[(k + 1) % 3]! * above[(k + 2) % 3]! - ahead[(k + 2) % 3]! * above[(k + 1) % 3]!);
+    const [length, size] = [Math.hypot(...across) || 1, Math.hypot(...above) || 1];
+    // The camera goes the other way.
+    const by = [0, 1, 2].map((k) => -height * ((right * across[k]!) / length + (up * above[k]!) / size));
+    camera.setPosition(...([0, 1, 2].map((k) => from[k]! + by[k]!) as Vector));
+    camera.setFocalPoint(...([0, 1, 2].map((k) => to[k]! + by[k]!) as Vector));
+  }
+
   /** A key with the focus on the picture; returns whether it moved the camera. */
   key(event: KeyboardEvent): boolean {
     if (event.ctrlKey || event.metaKey || event.altKey) return false;
@@ -186,7 +202,8 @@ export class Camera {
       r: () => this.reset(), c: () => this.corner(), x: () => this.axis(0, 1), y: () => this.axis(1, -1), z: () => this.axis(2, 1),
       X: () => this.axis(0, -1), Y: () => this.axis(1, 1), Z: () => this.axis(2, -1),
     };
-    const action = actions[event.key];
+    const by = event.shiftKey ? PANS[event.key] : undefined;
+    const action = by ? () => this.pan(...by) : actions[event.key];
     if (!action) return false;
     event.preventDefault();
     action();

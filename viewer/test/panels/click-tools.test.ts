@@ -18,7 +18,7 @@ describe("the tools that take clicks", () => {
     taken = [];
     let isMeasuring = false;
     heard = vi.spyOn(window, "addEventListener");
-    tools = new ClickTools([
+    tools = new ClickTools(document.getElementById("scene")!, [
       { button: "ruler", isOn: () => isMeasuring, toggle: () => { isMeasuring = !isMeasuring; }, take: () => true },
       new OnePlace("pin", (x) => x > 100 && taken.push(x) > 0),
     ]);
@@ -37,6 +37,23 @@ describe("the tools that take clicks", () => {
     expect([tools.taking()!(10, 0), pressed()]).toEqual([false, ["pin"]]);
     expect([tools.taking()!(110, 0), pressed(), taken]).toEqual([true, [], [110]]);
     expect(tools.taking()).toBeNull();
+  });
+
+  it("take the middle of the picture with Enter, where the focus is there", () => {
+    const scene = document.getElementById("scene")!;
+    const enter = (): KeyboardEvent => {
+      const event = new KeyboardEvent("keydown", { key: "Enter", bubbles: true, cancelable: true });
+      scene.dispatchEvent(event);
+      return event;
+    };
+    scene.getBoundingClientRect = () => new DOMRect(0, 50, 100, 400);
+    expect(enter().defaultPrevented).toBe(false);
+    tools.use("pin");
+    expect([enter().defaultPrevented, taken, pressed()]).toEqual([true, [], ["pin"]]);
+    expect(document.getElementById("tip")!.textContent).toBe("Nothing lies in the middle of the picture: turn or move it there.");
+    scene.getBoundingClientRect = () => new DOMRect(100, 50, 600, 400);
+    enter();
+    expect([taken, pressed(), document.getElementById("tip")!.hidden]).toEqual([[400], [], true]);
   });
 
   it("are left with Escape, which is then for nothing else; one that somebody types is not for them", () => {

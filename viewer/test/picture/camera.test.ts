@@ -3,7 +3,7 @@ import vtkRenderer from "@kitware/vtk.js/Rendering/Core/Renderer";
 import type vtkOpenGLRenderWindow from "@kitware/vtk.js/Rendering/OpenGL/RenderWindow";
 import { describe, expect, it } from "vitest";
 import { Camera } from "../../src/picture/camera";
-import type { Box, Covered } from "../../src/picture/camera";
+import type { Box, Covered, Stand } from "../../src/picture/camera";
 import { coveredBy, leaveRoomFor } from "../../src/picture/overlay";
 
 const BOX: Box = [-0.05, 0.05, -0.5, 0.5, -0.1, 0.1];
@@ -61,6 +61,31 @@ describe("the whole in the picture", () => {
     other.camera.stand = one.camera.stand;
     one.seen().across.forEach((end, i) => expect(other.seen().across[i]).toBeCloseTo(end, 9));
     expect(other.camera.stand).toEqual(one.camera.stand);
+  });
+});
+
+describe("the keys of the camera", () => {
+  it("move what is seen the way that an arrow with shift points, and turn without it", () => {
+    for (const parallel of [false, true]) {
+      const { camera, seen } = picture();
+      camera.reset();
+      camera.parallel = parallel;
+      const middle = (): [number, number] => { const { across, down } = seen(); return [(across[0] + across[1]) / 2, (down[0] + down[1]) / 2]; };
+      const distance = ({ position, focalPoint }: Stand): number => Math.hypot(...position.map((from, k) => from - focalPoint[k]!));
+      const press = (key: string, shiftKey: boolean): void => { expect(camera.key(new KeyboardEvent("keydown", { key, shiftKey }))).toBe(true); };
+      for (const [key, axis, sign] of [["ArrowLeft", 0, -1], ["ArrowRight", 0, 1], ["ArrowUp", 1, 1], ["ArrowDown", 1, -1]] as const) {
+        const [before, stand] = [middle(), camera.stand];
+        press(key, true);
+        const by = middle()[axis] - before[axis];
+        expect(sign * by, key).toBeGreaterThan(0.03);
+        expect(Math.abs(middle()[1 - axis]! - before[1 - axis]!), key).toBeLessThan(0.01);
+        expect(distance(camera.stand)).toBeCloseTo(distance(stand), 9);
+        camera.stand.viewUp.forEach((part, k) => expect(part).toBeCloseTo(stand.viewUp[k]!, 9));
+      }
+      const { focalPoint } = camera.stand;
+      press("ArrowLeft", false);
+      expect(camera.stand.focalPoint).toEqual(focalPoint);
+    }
   });
 });
 
