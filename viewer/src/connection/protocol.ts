@@ -197,7 +197,7 @@ export type ServerMessage =
 export type ClientMessage = { id?: string } & (
   | { order: Json } | { forecast: Json } | { withdraw_forecast: object } | { pause: object } | { resume: object } | { stop: object }
   | { parameter: { name: string; value: number } } | { pipelines: Json } | { cancel: { order: string } } | { drive: object }
-  | { play: { seek?: { seconds: number }; speed?: number; paused?: boolean } }
+  | { play: { seek?: { seconds: number } | { cycle: number }; speed?: number; paused?: boolean } }
   | { hand_over: { to: string } } | { keep: object } | { kick: { client: string } } | { here: object }
   | { link: { for: LinkFor } } | { name: { name: string } } | { follow: { on: boolean } } | { camera: ToldCamera }
   | { note: { text: string; at: Vector; cycle?: number } } | { remove_note: { number: number } }

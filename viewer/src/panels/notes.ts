@@ -47,10 +47,19 @@ export class NotesPanel {
       const note = store.state.notes.find((known) => known.number === number);
       if (!button || !note) return;
       if (button.dataset.act === "remove") commands.send({ remove_note: { number } });
-      else picture.flyTo(note.at);
+      else {
+        picture.flyTo(note.at);
+        this.seek(note);
+      }
     });
-    store.watch((state) => [state.notes, mayDrive(state)] as const, ([notes, may]) => this.show(notes, may), sameJson);
+    store.watch((state) => [state.notes, mayDrive(state), state.hello?.recording != null] as const, ([notes, may, isRecording]) => this.show(notes, may, isRecording), sameJson);
     this.sayPlace();
+  }
+
+  /** Takes a recording to the cycle of a note. */
+  private seek(note: PinnedNote): void {
+    if (!this.store.state.hello?.recording || this.commands.ask({ play: { seek: { cycle: note.cycle } } }) === null) return;
+    this.store.dispatch({ type: "note sought", note });
   }
 
   /** Begins to wait for a click in the picture, or waits no more. */
@@ -100,7 +109,7 @@ export class NotesPanel {
     write(part("note-place"), this.at ? `at (${this.at.map((value) => digits(value, 3)).join(", ")})` : "in the middle of the picture");
   }
 
-  private show(notes: readonly PinnedNote[], may: boolean): void {
+  private show(notes: readonly PinnedNote[], may: boolean, isRecording: boolean): void {
     if (!may && this.choosing) this.toggle();
     (part("note") as HTMLButtonElement).disabled = !may;
     part("notes-panel").hidden = !may && notes.length === 0;
@@ -108,7 +117,7 @@ export class NotesPanel {
     const list = part("notes");
     const held = list.contains(document.activeElement);
     list.replaceChildren(...notes.map(({ number, text, cycle, by }) => element("li", { "data-note": number },
-      element("button", { type: "button", class: "load", title: "Show its place" },
+      element("button", { type: "button", class: "load", title: isRecording ? "Show its place, and go to its cycle" : "Show its place" },
         element("span", { class: "title" }, text), element("span", { class: "detail" }, element("bdi", {}, by), ` · cycle ${cycle}`)),
       may ? element("button", { type: "button", class: "icon", "data-act": "remove", "aria-label": `Remove the note of ${by}: ${short(text)}` }, "×") : null)));
     if (held) (list.querySelector<HTMLElement>("button") ?? part("note-text")).focus();

@@ -75,6 +75,7 @@ function after(state: State, action: Action): State {
     case "pipelines known": case "pipelines outcome": case "pipelines refused": case "pipelines asked":
     case "pipeline opened": case "pipeline written": case "pipeline checked": case "pipeline left": case "pipeline discarded":
       return { ...state, pipelines: pipelinesAfter(state.pipelines, action) };
+    case "note sought": return { ...state, soughtNote: action.note };
     case "wheel answered": return { ...state, askedBy: null };
     case "refused": {
       const orders = orderRefused(state.orders, action.id, action.text);
@@ -153,11 +154,18 @@ function withHello(state: State, hello: Hello): State {
     askedBy: hello.role === "driver" ? state.askedBy : null,
     following: hello.role !== "driver" && state.following,
     followedBy: hello.role === "driver" ? state.followedBy : 0,
-    notes: hello.notes ?? state.notes,
+    ...notesOf(state, hello),
     // Whoever has the wheel now need not know that it was refused before.
     refusal: hello.role !== state.hello?.role ? "" : state.refusal,
   };
   return withoutLostEdit(state, next);
+}
+
+/** The notes that a hello tells. One that was looked for is of the cycle that was seen then; it was written down later, and is not told there yet. */
+function notesOf({ notes: known, soughtNote }: State, { notes, recording }: Hello): Pick<State, "notes" | "soughtNote"> {
+  if (!notes) return { notes: known, soughtNote };
+  const isUntold = recording && soughtNote && !notes.some(({ number }) => number === soughtNote.number);
+  return { notes: isUntold ? [...notes, soughtNote] : notes, soughtNote: null };
 }
 
 function withParameters(state: State, values: Readonly<Record<string, number>>): State {

@@ -110,6 +110,8 @@ export interface State {
   following: boolean;
   /** The notes that are pinned, the oldest first. */
   notes: readonly PinnedNote[];
+  /** The note to whose cycle a recording is on its way; null for none. */
+  soughtNote: PinnedNote | null;
   pipelines: PipelinesState;
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
@@ -132,5 +134,5 @@ export const INITIAL: State = {
   keptDraft: null,
   orders: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
-  askedBy: null, people: [], followedBy: 0, following: false, notes: [], pipelines: NO_PIPELINES, refusal: "", errors: [],
+  askedBy: null, people: [], followedBy: 0, following: false, notes: [], soughtNote: null, pipelines: NO_PIPELINES, refusal: "", errors: [],
 };

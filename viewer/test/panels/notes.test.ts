@@ -43,6 +43,26 @@ describe("notes", () => {
     expect([made.sent.length, at("note-problem").textContent]).toEqual([count, "A note needs a text."]);
   });
 
+  it("of a recording lead to their place and their cycle, at which they are not told yet", () => {
+    const recording = { first: { seconds: 0, cycle: 0, time: 0 }, last: { seconds: 9, cycle: 900, time: 9 } };
+    const rows = (): string[] => [...at("notes").querySelectorAll(".title")].map(({ textContent }) => textContent);
+    const press = (number: number): void => at("notes").querySelector<HTMLElement>(`[data-note="${number}"] .load`)!.click();
+    made.greet({ notes: [note(1, "the eddy"), note(2, "the gap", { cycle: 80 })] });
+    press(2);
+    expect([flown, made.sent]).toEqual([[[2, 0, 0]], []]);
+    made.greet({ recording, notes: [note(1, "the eddy"), note(2, "the gap", { cycle: 80 })] });
+    press(2);
+    expect([flown.length, last()]).toMatchObject([2, { play: { seek: { cycle: 80 } } }]);
+    made.greet({ recording, notes: [note(1, "the eddy")] });
+    expect(rows()).toEqual(["the eddy", "the gap"]);
+    // Somewhere else it is a note of another moment again.
+    made.greet({ recording, notes: [note(1, "the eddy")] });
+    expect(rows()).toEqual(["the eddy"]);
+    press(1);
+    made.greet({ recording, notes: [note(1, "the eddy")] });
+    expect(rows()).toEqual(["the eddy"]);
+  });
+
   it("gives a text back that was refused", () => {
     type("too much");
     expect(panel.refused("another", "x")).toBe(false);
