@@ -5,8 +5,14 @@
 import type { ConnectionState } from "./connection/connection";
 import type { Person, PinnedNote, QualitySummary, Role, RunEnd, Status, Vector } from "./connection/protocol";
 import type { Stand } from "./picture/camera";
-import type { Picture } from "./picture/scene";
-import type { OrderRecord, PreviewState } from "./store/state";
+import type { Handles } from "./handles/handles";
+import { own } from "./own";
+import type { Picture, Scene } from "./picture/scene";
+import type { SliceHandle } from "./picture/slice-handle";
+import type { Action } from "./store/actions";
+import { chosen } from "./store/draft";
+import type { OrderRecord, PreviewState, State } from "./store/state";
+import type { Store } from "./store/store";
 
 export interface ViewInspection { bounds: [Vector, Vector] | null; points: number; triangles: number; topology: string | null; /** Of the newest frame; null before the first. */ cycle: number | null }
 
@@ -72,6 +78,55 @@ export interface Inspection {
 
 declare global {
   interface Window { tombolo?: Inspection }
+}
+
+/** What the store knows, and what is drawn. */
+export function inspectionOf(
+  store: Pick<Store<State, Action>, "state">, scene: Scene, handles: Pick<Handles, "nodePlaces" | "places" | "isFree">, sliceHandle: Pick<SliceHandle, "place">,
+): Inspection {
+  return {
+    get connection() { return store.state.connection.state; },
+    get role() { return store.state.hello?.role ?? null; },
+    get client() { return store.state.hello ? String(store.state.hello.client) : null; },
+    get cycle() { return store.state.frames.cycle; },
+    get frames() { return store.state.frames.count; },
+    get views() {
+      return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
+        bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,
+        triangles: (layer.topology?.triangles.length ?? 0) / 3, topology: layer.topology?.topology ?? null,
+        cycle: own(store.state.frames.views, name)?.cycle ?? null,
+      }]));
+    },
+    get orders() { return structuredClone(store.state.orders); },
+    get status() { return structuredClone(store.state.status); },
+    get quality() { return structuredClone(store.state.status?.quality ?? null); },
+    get stack() { return structuredClone(store.state.hello?.stack ?? []); },
+    get selection() { return { handle: chosen(store.state, "handle"), fixed: chosen(store.state, "fixed") }; },
+    get preview() { return { ...structuredClone(store.state.preview), bounds: scene.previewBounds }; },
+    get forecast() {
+      const { state, answer, reason } = store.state.forecast;
+      return {
+        state, reason, outcome: answer?.outcome ?? null, min: answer?.quality?.min ?? answer?.min_scaled_jacobian ?? null,
+        inverted: answer?.quality?.inverted ?? null, fraction: answer?.fraction ?? null,
+      };
+    },
+    get pipelines() { return structuredClone(store.state.pipelines.known); },
+    get people() { return structuredClone(store.state.people); },
+    get notes() { return structuredClone(store.state.notes); },
+    get following() { return store.state.following; },
+    get camera() { return scene.camera.stand; },
+    get end() { return structuredClone(store.state.end); },
+    get errors() { return [...store.state.errors]; },
+    get skeleton() {
+      const bones = scene.shownBones;
+      return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: handles.nodePlaces() };
+    },
+    get gizmo() { return handles.places(); },
+    get sliceHandle() { return sliceHandle.place; },
+    picture: () => scene.picture(),
+    featureBounds: (name) => scene.featureBounds(name),
+    featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
+  };
 }
 
 /** Publishes the getters of `source` on `window.tombolo`. */

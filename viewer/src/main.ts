@@ -1,18 +1,19 @@
 /** Puts the parts together: what arrives becomes an action, what is asked a message, and every panel shows the store. */
 import { keepIdentity } from "./connection/identity";
+import { loadJson } from "./connection/json";
 import { Pipelines } from "./connection/pipelines";
-import type { Frame, Json, Monitor, ServerMessage, ToldHello, Vector } from "./connection/protocol";
+import type { Frame, Monitor, ServerMessage, ToldHello, Vector } from "./connection/protocol";
 import { SentViews } from "./connection/sent-views";
 import { Stack } from "./connection/stack";
 import { watchDefects } from "./defects";
 import { part, write } from "./dom";
-import { EditForm, initialSettings } from "./form/form";
-import { orderForm } from "./form/schema";
+import { EditForm } from "./form/form";
+import { SchemaLoader } from "./form/loader";
 import { Handles } from "./handles/handles";
 import { FaceTools } from "./handles/face-tools";
 import { Overlay } from "./handles/overlay";
 import { ShapeTarget } from "./handles/shape-target";
-import { publish } from "./inspection";
+import { inspectionOf, publish } from "./inspection";
 import { History, seriesKey } from "./history/series";
 import { Dock } from "./history/dock";
 import { HistogramPlot } from "./history/histogram-plot";
@@ -24,10 +25,12 @@ import { pointed } from "./number";
 import { own } from "./own";
 import { ClickTools, OnePlace, middleOf } from "./panels/click-tools";
 import type { ClickTool } from "./panels/click-tools";
+import { watchEmpty } from "./panels/empty";
 import { EditsPanel } from "./panels/edits";
 import { watchKeys } from "./panels/keys";
 import { FIELD_TITLES, LookPanel } from "./panels/look";
 import { FilesPanel } from "./panels/files";
+import { Notice } from "./panels/notice";
 import { NotesPanel } from "./panels/notes";
 import { PeoplePanel } from "./panels/people";
 import { MonitorPanel } from "./panels/monitors";
@@ -70,7 +73,6 @@ import { Previewer } from "./preview/previewer";
 import { Memory } from "./remember";
 import type { Action } from "./store/actions";
 import { Commands } from "./store/commands";
-import { chosen } from "./store/draft";
 import { appliedOrders, isShapeUnderWay } from "./store/orders";
 import { fieldNamed, fieldsOf, sameFields } from "./store/fields";
 import { Kept, KeptRun } from "./store/kept";
@@ -142,18 +144,14 @@ const fieldTitle = (field: string | null, component: number, view: string | null
 const unitOf = (field: string | null): string | null => fieldNamed(store.state, field)?.unit ?? null;
 /** A field and its component in words, with its unit. */
 const titleWithUnit = (field: string | null, component: number): string => withUnit(fieldTitle(field, component), unitOf(field));
-let shownBars: Bar[] = [];
 const bars = new ScalarBars(part("bars"), ({ look: { field, component }, views }) => ({ title: fieldTitle(field, component, views[0]), unit: unitOf(field) }), (names, range) => {
   for (const view of names) {
     const look = own(store.state.looks, view);
     if (look) store.dispatch({ type: "look", view, look: { range: withTyped(look.range, range) } });
   }
 });
-/** Whether the browser has taken away what draws the picture. */
-let isLost = false;
 const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   bars: (shown) => {
-    shownBars = shown;
     bars.show(shown);
     look.setBars(shown);
     compare.setBars(shown);
@@ -175,7 +173,7 @@ const scene = new Scene(part("scene"), canvasOfPage(), selection, {
   },
   trouble: report,
   covered: () => coveredBy(part("scene"), part("tools"), part("bars")),
-  lost: (gone) => { isLost = gone; sayEmpty(); },
+  lost: (isLost) => store.dispatch({ type: "picture lost", isLost }),
 });
 // The bars of a view may come after the first picture, and go.
 new ResizeObserver(() => {
@@ -279,7 +277,7 @@ store.watch((state) => state.frames.count > 0, () => dock.update());
 const barTitle = ({ look: { field, component } }: Bar): string => titleWithUnit(field, component);
 const ink = (): string => getComputedStyle(document.body).color;
 const ground = (): string => getComputedStyle(document.body).getPropertyValue("--over").trim();
-const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, shownBars, barTitle, ink(), ground()), {
+const movie = new Movie(() => scene.element, (context, picture) => paint(context, picture, bars.all, barTitle, ink(), ground()), {
   name: () => `tombolo-${store.state.frames.cycle ?? 0}`,
   told: (isRunning) => {
     scene.isFilmed = isRunning;
@@ -300,7 +298,7 @@ watchPictureTools(part("scene"), part("stage"), {
   unpin: () => pins.clear(),
   use: (button) => clickTools.use(button),
   movie: () => movie.toggle(),
-  save: () => scene.withPicture((canvas) => save(withBars(canvas, shownBars, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
+  save: () => scene.withPicture((canvas) => save(withBars(canvas, bars.all, barTitle, ink(), ground()), `tombolo-${store.state.frames.cycle ?? 0}.png`)),
 });
 const monitors = new MonitorPanel(part("monitors"));
 const parameters = new ParameterPanel(part("parameters"), store, commands);
@@ -414,6 +412,7 @@ const memory = new Memory(store, keptRun, {
   whenDrawn: (then) => store.watch((state) => state.frames.count > 0, (isThere) => { if (isThere) void scene.picture().then(then); }),
 });
 
+const schemaLoader = new SchemaLoader(store, () => loadJson(addresses.schema));
 store.watch((state) => state.hello, (hello) => {
   if (!hello) return;
   memory.greeted(hello);
@@ -425,58 +424,13 @@ store.watch((state) => state.hello, (hello) => {
     monitors.keep(shown);
     monitored.keep([...shown.map(({ pipeline, name }) => seriesKey(pipeline, name)), ...(isMonitored(shown) ? [] : [seriesKey(MESH, SMALLEST)])]);
   }
-  if (!store.state.form) later.run(() => void loadSchema(hello.defaults));
+  if (!store.state.form) later.run(() => void schemaLoader.want(hello));
 });
 
-async function loadJson(address: string): Promise<Json> {
-  const response = await fetch(address, { cache: "no-store", redirect: "error" });
-  if (!response.ok) throw new Error(response.statusText);
-  return await response.json() as Json;
-}
-
-let isLoadingSchema = false;
-/** Asks for what an order may hold, which no hello says: it is long and stays the same. */
-async function loadSchema(defaults: { schedule?: Json }): Promise<void> {
-  if (isLoadingSchema) return;
-  isLoadingSchema = true;
-  try {
-    store.dispatch({ type: "schema", form: orderForm(await loadJson(addresses.schema)), settings: initialSettings(defaults) });
-  } catch (error) {
-    report(`what an order may hold: ${String(error)}`);
-  } finally {
-    isLoadingSchema = false;
-  }
-}
-
-let noticed = 0;
-store.watch((state) => state.errors, (errors) => {
-  const newest = errors.at(-1);
-  const notice = part("notice");
-  if (newest === undefined) return;
-  write(notice, `Something went wrong: ${newest}.`);
-  notice.hidden = false;
-  clearTimeout(noticed);
-  noticed = window.setTimeout(() => { notice.hidden = true; }, 10000);
-});
-
+new Notice(store);
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
-const LOST: [string, string] = ["The picture is gone", "The browser has taken away what draws it, and may give it back. Reload the page if it does not."];
-/** What is said in place of the picture, as long as there is none. */
-function emptyText({ frames, connection: { state, explanation }, hello, end }: State): [string, string] {
-  if (frames.count > 0) return ["", ""];
-  if (end) return ["The run has ended", "No picture came before its end."];
-  if (state === "refused") return ["This link does not open the simulation", "It was used already, or is of another run. Open a link that this simulation told when it started."];
-  if (state === "dismissed") return ["Not connected", explanation];
-  if (state !== "connected") return ["Waiting for the simulation", "Nothing answers at this address yet. The viewer connects by itself as soon as the run is there."];
-  if (hello && hello.views.length === 0) return ["Nothing is streamed", "The simulation runs, but no pipeline of its configuration ends in a stream stage."];
-  return ["Connected", "The first picture appears when the simulation has taken its next step."];
-}
-function sayEmpty(): void {
-  showEmpty(...(isLost ? LOST : emptyText(store.state)));
-}
-store.watch(emptyText, sayEmpty, sameJson);
-
+watchEmpty(store);
 part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 
@@ -496,49 +450,7 @@ part("skeleton").addEventListener("click", (event) => {
   previewer.showSkeleton(shown);
 });
 
-publish({
-  get connection() { return store.state.connection.state; },
-  get role() { return store.state.hello?.role ?? null; },
-  get client() { return store.state.hello ? String(store.state.hello.client) : null; },
-  get cycle() { return store.state.frames.cycle; },
-  get frames() { return store.state.frames.count; },
-  get views() {
-    return Object.fromEntries([...scene.layers].map(([name, layer]) => [name, {
-      bounds: scene.viewBounds(name), points: layer.topology?.points ?? 0,
-      triangles: (layer.topology?.triangles.length ?? 0) / 3, topology: layer.topology?.topology ?? null,
-      cycle: own(store.state.frames.views, name)?.cycle ?? null,
-    }]));
-  },
-  get orders() { return structuredClone(store.state.orders); },
-  get status() { return structuredClone(store.state.status); },
-  get quality() { return structuredClone(store.state.status?.quality ?? null); },
-  get stack() { return structuredClone(store.state.hello?.stack ?? []); },
-  get selection() { return { handle: chosen(store.state, "handle"), fixed: chosen(store.state, "fixed") }; },
-  get preview() { return { ...structuredClone(store.state.preview), bounds: scene.previewBounds }; },
-  get forecast() {
-    const { state, answer, reason } = store.state.forecast;
-    return {
-      state, reason, outcome: answer?.outcome ?? null, min: answer?.quality?.min ?? answer?.min_scaled_jacobian ?? null,
-      inverted: answer?.quality?.inverted ?? null, fraction: answer?.fraction ?? null,
-    };
-  },
-  get pipelines() { return structuredClone(store.state.pipelines.known); },
-  get people() { return structuredClone(store.state.people); },
-  get notes() { return structuredClone(store.state.notes); },
-  get following() { return store.state.following; },
-  get camera() { return scene.camera.stand; },
-  get end() { return structuredClone(store.state.end); },
-  get errors() { return [...store.state.errors]; },
-  get skeleton() {
-    const bones = scene.shownBones;
-    return bones && { nodes: bones.now.length / 3, segments: bones.segments.length / 2, places: handles.nodePlaces() };
-  },
-  get gizmo() { return handles.places(); },
-  get sliceHandle() { return sliceHandle.place; },
-  picture: () => scene.picture(),
-  featureBounds: (name) => scene.featureBounds(name),
-  featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
-});
+publish(inspectionOf(store, scene, handles, sliceHandle));
 
 stream.listen({
   state: (state, explanation) => store.dispatch({ type: "connection", state, explanation }),

@@ -20,7 +20,11 @@ export class ScalarBars {
   /** `fix` is told the range that somebody typed, and the views that it is for. */
   constructor(private readonly root: HTMLElement, private readonly describe: (bar: Bar) => BarText, private readonly fix: (views: readonly string[], range: Range) => void) {}
 
+  /** The bars that are shown. */
+  all: readonly Bar[] = [];
+
   show(bars: readonly Bar[]): void {
+    this.all = bars;
     const keys = new Set(bars.map(({ key }) => key));
     for (const [key, { root }] of this.shown) {
       if (keys.has(key)) continue;

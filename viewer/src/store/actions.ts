@@ -59,6 +59,8 @@ export type Action =
   // The features.
   | { type: "part"; feature: string; part: Part | null }
   | { type: "hover"; feature: string | null }
+  /** The browser has taken away what draws the picture, or given it back. */
+  | { type: "picture lost"; isLost: boolean }
   /** The page was loaded again: what it showed, and what stood in the form. */
   | { type: "remembered"; chosenView: string | null; draft: KeptDraft | null }
   // The form. `step` names the field or gesture: all that it does is one step to take back.

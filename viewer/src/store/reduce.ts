@@ -81,6 +81,7 @@ function after(state: State, action: Action): State {
       const orders = orderRefused(state.orders, action.id, action.text);
       return orders === state.orders ? { ...state, refusal: action.text } : { ...state, orders };
     }
+    case "picture lost": return { ...state, isPictureLost: action.isLost };
     case "unreadable": return { ...state, errors: [...state.errors, action.text].slice(-LONGEST_ERRORS) };
     case "schema": return withSchema(state, action.form, action.settings);
     case "order sent": return withOrderSent(state, action.id, action.order, action.at);

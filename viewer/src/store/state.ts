@@ -113,6 +113,8 @@ export interface State {
   /** The note to whose cycle a recording is on its way; null for none. */
   soughtNote: PinnedNote | null;
   pipelines: PipelinesState;
+  /** Whether the browser has taken away what draws the picture. */
+  isPictureLost: boolean;
   /** What the simulation refused, in its own words; empty for nothing. */
   refusal: string;
   /** What went wrong: frames or messages that could not be read, and what has failed in the page; newest last. */
@@ -134,5 +136,5 @@ export const INITIAL: State = {
   keptDraft: null,
   orders: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
-  askedBy: null, people: [], followedBy: 0, following: false, notes: [], soughtNote: null, pipelines: NO_PIPELINES, refusal: "", errors: [],
+  askedBy: null, people: [], followedBy: 0, following: false, notes: [], soughtNote: null, pipelines: NO_PIPELINES, isPictureLost: false, refusal: "", errors: [],
 };
