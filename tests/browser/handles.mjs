@@ -109,6 +109,20 @@ const steps = [
     const [a, b, c] = await values("by");
     check(a === 0 && b === 0 && c > 0, `the translation is ${[a, b, c]}`);
     await cancel();
+    // Two zoom, also where the first lies on a handle.
+    const far = () => page.evaluate(() => { const { position, focalPoint } = window.tombolo.camera; return Math.hypot(...position.map((part, k) => part - focalPoint[k])); });
+    const before = await far();
+    const [left, top] = await gizmo("arrow z");
+    const two = (apart) => [{ x: left + 8, y: top - apart, id: 0 }, { x: left + 8, y: top + 60 + apart, id: 1 }];
+    await touch("touchStart", two(0).slice(0, 1));
+    await touch("touchStart", two(0));
+    for (const apart of [5, 10, 20, 30]) await touch("touchMove", two(apart));
+    await touch("touchEnd", []);
+    await drawn();
+    const after = await far();
+    check(after < 0.9 * before, `a pinch has gone from ${before} to ${after}`);
+    await nothing();
+    await page.click('[data-camera="0"]');
   }],
   ["a pen moves it", async () => {
     const [x, y] = await gizmo("arrow z");

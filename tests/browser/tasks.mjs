@@ -73,6 +73,17 @@ const steps = [
   ["the pressure before and after stands beside the plot", async () => {
     await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /pressure/i.test(row.textContent) && /%/.test(row.textContent)));
     await filmed("pressure");
+    // The same by the keyboard: another cycle, closer, the whole again.
+    await page.focus('#dock [role="slider"]');
+    await page.keyboard.press("ArrowLeft");
+    await viewer.holds("an earlier cycle beside the plot", () => {
+      const cycle = document.querySelector('#dock [role="slider"]').ariaValueText.split(";")[0];
+      return /^cycle [0-9]+$/.test(cycle) && document.querySelector("#dock .table-title").textContent.startsWith(cycle);
+    });
+    for (const [key, isZoomed] of [["+", true], ["0", false]]) {
+      await page.keyboard.press(key);
+      check((await page.getByRole("button", { name: "Whole" }).isEnabled()) === isZoomed, `${key} in the plot does nothing`);
+    }
   }],
   ["the first of two edits is changed", async () => {
     await page.selectOption("#action", "translate");

@@ -69,7 +69,7 @@ export class HistoryPlot implements Tab {
     this.body = element("div", { class: "dock-body" }, this.canvas,
       element("div", { class: "values" }, this.heading, this.table.element,
         element("details", {}, element("summary", {}, "Monitors in the plot"), this.choices)));
-    this.tools = [element("span", { class: "hint" }, "drag or pinch to zoom · double-click for the whole"), this.axes, this.whole, csv];
+    this.tools = [element("span", { class: "hint", title: "A double click shows the whole again" }, "drag or pinch to zoom"), this.axes, this.whole, csv];
     this.axes.hidden = true;
     // The mouse takes the cursor along, wherever it was put.
     this.canvas.addEventListener("mousemove", () => { this.held = null; }, true);
