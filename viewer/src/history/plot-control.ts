@@ -16,6 +16,10 @@ export interface Controlled {
   whole(): void;
   /** Moves the cursor by so many values; infinitely many are the first or the last. */
   step(by: number): void;
+  /** Whether keys or a finger have put the cursor anywhere. */
+  hasCursor(): boolean;
+  /** Takes that cursor away. */
+  release(): void;
   /** Puts the cursor at a place, of 0 to 1 across the plot. */
   point(at: number): void;
   /** Two fingers have gone from places to others, all of 0 to 1, since both were down. */
@@ -61,8 +65,10 @@ export function watchPlot(root: HTMLElement, area: () => { left: number; width: 
     const steps = event.shiftKey ? LEAP : 1;
     const actions: Record<string, () => void> = {
       "+": () => plot.zoomBy(CLOSER), "=": () => plot.zoomBy(CLOSER), "-": () => plot.zoomBy(1 / CLOSER), 0: () => plot.whole(),
-      ArrowLeft: () => plot.step(-steps), ArrowRight: () => plot.step(steps), Home: () => plot.step(-Infinity), End: () => plot.step(Infinity),
+      ArrowLeft: () => plot.step(-steps), ArrowRight: () => plot.step(steps), ArrowDown: () => plot.step(-steps), ArrowUp: () => plot.step(steps), Home: () => plot.step(-Infinity), End: () => plot.step(Infinity),
     };
+    // Where there is no cursor to be taken away, the key is meant for something else.
+    if (event.key === "Escape" && plot.hasCursor()) actions.Escape = () => plot.release();
     const action = actions[event.key];
     if (!action) return;
     event.preventDefault();

@@ -49,7 +49,7 @@ export class HistoryPlot implements Tab {
   private zoom: Span | null = null;
   /** What was shown when a pinch began. */
   private pinchedFrom: Span = [0, 1];
-  private readonly canvas = element("div", { class: "plot", tabindex: 0, role: "slider", "aria-label": "cursor of the history", title: "+ and − zoom, arrows move the cursor, 0 shows the whole" });
+  private readonly canvas = element("div", { class: "plot", tabindex: 0, role: "slider", "aria-label": "cursor of the history", title: "+ and − zoom, arrows move the cursor, Esc takes it away, 0 shows the whole" });
   private readonly axes = element("div", { class: "axes", role: "group", "aria-label": "Plotted over" },
     ...["cycle", "time"].map((name, i) => element("button", { type: "button", class: "small", "aria-pressed": String(i === 0), onclick: () => this.plotOver(i === 1) }, name)));
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
@@ -75,6 +75,7 @@ export class HistoryPlot implements Tab {
     this.canvas.addEventListener("mousemove", () => { this.held = null; }, true);
     watchPlot(this.canvas, () => this.canvas.querySelector(".u-over")?.getBoundingClientRect() ?? null, {
       zoomBy: (factor) => this.zoomBy(factor), whole: () => this.zoomTo(null), step: (by) => this.step(by),
+      hasCursor: () => this.held !== null, release: () => this.release(),
       point: (at) => {
         const along = this.shown[0] + at * (this.shown[1] - this.shown[0]);
         this.hold(this.isOverTime ? valueAt(this.times, this.cycles, along) : along);
@@ -294,6 +295,13 @@ export class HistoryPlot implements Tab {
     if (at === undefined) return;
     this.hold(this.cycles[row]!);
     if (this.zoom) this.zoomTo(within(containing(this.zoom, at), this.ends));
+  }
+
+  /** The newest values are shown again. */
+  private release(): void {
+    this.held = this.row = null;
+    this.plot?.setCursor({ left: -1, top: -1 }, false);
+    this.values();
   }
 
   private hold(cycle: number): void {

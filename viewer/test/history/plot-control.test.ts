@@ -22,18 +22,30 @@ describe("the part of an axis that is shown", () => {
   });
 });
 
-describe("fingers on a plot", () => {
+describe("keys and fingers on a plot", () => {
   let asked: unknown[];
   let root: HTMLElement;
+  let hasCursor: boolean;
   const send = (kind: string, pointerId: number, x: number, pointerType = "touch"): boolean =>
     root.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType, clientX: x }));
   beforeEach(() => {
-    asked = [];
+    [asked, hasCursor] = [[], false];
     root = document.createElement("div");
     watchPlot(root, () => ({ left: 100, width: 200 }), {
-      zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
+      zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), hasCursor: () => hasCursor, release: () => asked.push("release"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
       pinchBegun: () => asked.push("begun"), pinch: (from, to) => asked.push(["pinch", from, to]),
     });
+  });
+
+  it("move the cursor and zoom, and leave what they do not mean to others", () => {
+    const press = (key: string, more: KeyboardEventInit = {}): boolean => root.dispatchEvent(new KeyboardEvent("keydown", { key, cancelable: true, ...more }));
+    for (const key of ["ArrowLeft", "ArrowDown", "ArrowRight", "ArrowUp", "Home", "End", "+", "=", "-", "0"]) expect(press(key), key).toBe(false);
+    expect(asked).toEqual([-1, -1, 1, 1, -Infinity, Infinity, 0.5, 0.5, 2, "whole"]);
+    press("ArrowLeft", { shiftKey: true });
+    expect(asked.at(-1)).toBe(-10);
+    for (const [key, more] of [["x", {}], ["Tab", {}], ["0", { ctrlKey: true }], ["Escape", {}]] as const) expect(press(key, more), key).toBe(true);
+    hasCursor = true;
+    expect([press("Escape"), asked.at(-1), asked.length]).toEqual([false, "release", 12]);
   });
 
   it("put the cursor where one taps, of which the browser makes no drag of a mouse", () => {

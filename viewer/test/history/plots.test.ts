@@ -188,6 +188,9 @@ describe("the plots below the picture", () => {
       expect([heading(), cells()[0]]).toEqual(["cycle 0", "1"]);
       key("ArrowRight", { shiftKey: true });
       expect(heading()).toContain("cycle 100");
+      key("ArrowLeft");
+      key("Escape");
+      expect([heading(), canvas().getAttribute("aria-valuetext"), made[0]!.setCursor.mock.lastCall![0]]).toEqual(["cycle 100 · before: Throat", "the newest values", { left: -1, top: -1 }]);
     });
 
     it("the cursor stays at its cycle while values come, until the mouse takes it", () => {
