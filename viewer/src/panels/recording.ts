@@ -9,6 +9,11 @@ import type { Store } from "../store/store";
 /** Milliseconds between two messages while the slider is dragged. */
 const DRAG_PERIOD = 150;
 
+/** The most characters that a time has: `0.001234`. */
+const LONGEST_TIME = 8;
+
+const momentText = (cycle: number, time: number): string => `cycle ${cycle}, time ${digits(time)}`;
+
 export class RecordingPanel {
   private readonly slider = part("moment") as HTMLInputElement;
   private readonly button = part("play") as HTMLButtonElement;
@@ -25,6 +30,8 @@ export class RecordingPanel {
       if (!recording) return;
       this.slider.min = String(recording.first.seconds);
       this.slider.max = String(recording.last.seconds);
+      // The longest text has room: the slider would else become shorter and longer under the hand that drags it.
+      part("moment-text").style.minWidth = `${momentText(recording.last.cycle, 0).length + LONGEST_TIME}ch`;
       this.show();
     });
     store.watch((state) => state.played, () => this.show());
@@ -59,7 +66,7 @@ export class RecordingPanel {
     const { played } = this.store.state;
     if (!played) return;
     if (!this.held) this.slider.value = String(played.seconds);
-    const text = `cycle ${played.cycle}, time ${digits(played.time)}`;
+    const text = momentText(played.cycle, played.time);
     write(part("moment-text"), text);
     this.slider.setAttribute("aria-valuetext", text);
     // A connection that is made anew begins with another speed than was chosen before. Written where it differs: the list may be open.

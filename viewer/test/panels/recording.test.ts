@@ -43,6 +43,15 @@ describe("the slider of a recording", () => {
     expect(slider().value).toBe("31");
   });
 
+  it("stays as wide as it is, whatever moment it shows", () => {
+    made.greet({ recording });
+    const room = Number.parseInt(document.getElementById("moment-text")!.style.minWidth);
+    for (const moment of [{ cycle: 0, time: 0 }, { cycle: 7, time: 0.0012345678 }, { cycle: 600, time: 12345.6 }, { cycle: 600, time: 0.000123456 }]) {
+      made.store.dispatch({ type: "played", played: played(moment) });
+      expect(document.getElementById("moment-text")!.textContent.length).toBeLessThanOrEqual(room);
+    }
+  });
+
   it("is let go of with the pointer, also where a drag ends as it began", () => {
     made.greet({ recording });
     for (const [end, bubbles] of [["pointerup", true], ["pointercancel", true], ["blur", false]] as const) {
