@@ -118,7 +118,7 @@ fn demonstrate(name: &str, mesh: &str) {
     for pipeline in pipelines["pipelines"].as_array_mut().expect("pipelines") {
         // A small mesh takes its steps faster than a browser draws.
         if let Some(steps) = pipeline.pointer_mut("/every/steps") {
-            *steps = 50.into();
+            *steps = 100.into();
         }
     }
     for (file, content) in [("case.json", case), ("pipelines.json", pipelines)] {

@@ -197,22 +197,30 @@ export class Viewer {
   }
 }
 
-/** What one finger or two do on a page that has touch: told to the browser, which makes of it what it makes of a real one. */
+/** What fingers do on a page that has touch: told to the browser, which makes of it what it makes of real ones. */
 export class Fingers {
-  constructor(viewer) {
-    this.page = viewer.page;
-    this.session = viewer.page.context().newCDPSession(viewer.page);
+  constructor({ page }) {
+    this.page = page;
+    this.session = page.context().newCDPSession(page);
   }
 
-  async touch(type, places) {
-    const touchPoints = places.map(([x, y], id) => ({ x, y, id }));
-    await (await this.session).send("Input.dispatchTouchEvent", { type, touchPoints });
+  /** Where the page is narrow: has this drawer open, and no other; none without a name. */
+  async drawer(side = "") {
+    const open = await this.page.evaluate(() => document.body.dataset.drawer ?? "");
+    const button = this.page.locator(`#${side || open}-drawer`);
+    if (side !== open && (await button.isVisible())) await button.tap();
   }
 
-  /** Taps a place of the page, or an element once it has been brought into sight. */
-  async tap(where) {
-    if (Array.isArray(where)) await this.page.touchscreen.tap(...where);
-    else await this.page.locator(where).tap();
+  /** Taps an element, in the drawer that it lies in. */
+  async press(selector) {
+    await this.drawer(await this.page.evaluate((wanted) => document.querySelector(wanted)?.closest("#left, #right")?.id, selector));
+    await this.page.locator(selector).tap();
+  }
+
+  /** Writes into a field as the keyboard of a screen does: the text comes, and no keys. */
+  async write(selector, text) {
+    await this.press(selector);
+    await this.page.locator(selector).fill(String(text));
   }
 
   /** Goes from a place of the page by so much. */
@@ -222,40 +230,50 @@ export class Fingers {
 
   /** Each finger goes from its place of the page by so much, all at once. */
   async spread(from, by, parts = 6) {
-    await this.touch("touchStart", from);
-    for (let part = 1; part <= parts; part++) await this.touch("touchMove", from.map((place, i) => place.map((value, k) => value + (by[i][k] * part) / parts)));
-    await this.touch("touchEnd", []);
-  }
-
-  /** Writes into a field as the keyboard of a screen does: the text comes, and no keys. */
-  async write(selector, text) {
-    await this.tap(selector);
-    await this.page.locator(selector).fill(String(text));
+    const at = (part) => from.map(([x, y], id) => ({ id, x: x + (by[id][0] * part) / parts, y: y + (by[id][1] * part) / parts }));
+    const touch = async (type, touchPoints) => (await this.session).send("Input.dispatchTouchEvent", { type, touchPoints });
+    await touch("touchStart", at(0));
+    for (let part = 1; part <= parts; part++) await touch("touchMove", at(part));
+    await touch("touchEnd", []);
   }
 }
 
 /** What is done by keys alone. */
 export class Keys {
-  constructor(viewer) {
-    this.page = viewer.page;
+  constructor({ page }) {
+    this.page = page;
   }
 
-  async press(...keys) {
-    for (const key of keys) await this.page.keyboard.press(key);
-  }
-
-  /** Goes on by a key, such as Tab, until an element has the focus that matches. */
-  async to(selector, key = "Tab") {
-    for (let presses = 0; presses < 300; presses++) {
-      await this.page.keyboard.press(key);
-      if (await this.page.evaluate((wanted) => document.activeElement?.matches(wanted) === true, selector)) return;
+  /** Goes to an element by Tab, or back to it: as often as there seem to be elements between, and then on. */
+  async to(selector) {
+    const { keyboard } = this.page;
+    for (let tries = 0; tries < 30; tries++) {
+      const { isThere, isBehind, between } = await this.page.evaluate((wanted) => {
+        const [active, target] = [document.activeElement, document.querySelector(wanted)];
+        const follows = (a, b) => (a.compareDocumentPosition(b) & Node.DOCUMENT_POSITION_FOLLOWING) !== 0;
+        const stops = [...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")].filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility({ visibilityProperty: true }));
+        const isBehind = target !== null && follows(target, active) && active !== document.body;
+        const [from, to] = isBehind ? [target, active] : [active, target];
+        return { isThere: active === target, isBehind, between: to === null ? 0 : stops.filter((stop) => follows(from, stop) && follows(stop, to)).length };
+      }, selector);
+      if (isThere) return;
+      if (isBehind) await keyboard.down("Shift");
+      // All of them at once: a page that draws is slow to say that it has heard of each.
+      await Promise.all(Array.from({ length: between + 1 }, () => keyboard.press("Tab")));
+      if (isBehind) await keyboard.up("Shift");
     }
-    throw new Failure(`${key} does not reach ${selector}`);
+    throw new Failure(`Tab does not reach ${selector}`);
   }
 
-  /** Writes into the field that has the focus, in place of what stands there. */
-  async write(text) {
-    await this.press("Control+a");
+  async press(selector) {
+    await this.to(selector);
+    await this.page.keyboard.press(await this.page.locator(selector).getAttribute("type") === "checkbox" ? "Space" : "Enter");
+  }
+
+  /** Writes into a field, in place of what stands there. */
+  async write(selector, text) {
+    await this.to(selector);
+    await this.page.keyboard.press("Control+a");
     await this.page.keyboard.type(String(text));
   }
 }

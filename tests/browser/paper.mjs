@@ -1,7 +1,7 @@
 /**
  * One of the paper's three demonstrations in Debian's Chromium, each by another means: the throat of the nozzle is pinched by the keyboard
  * alone, the outlet of the bypass is made less steep by the mouse, the pipe is widened by touch. Each is previewed, forecast, applied,
- * measured and taken back; then the run is stopped.
+ * measured and taken back. By keyboard and touch an earlier edit is changed, the wheel handed over, a pipeline added. Then the run is stopped.
  *
  *     TOMBOLO_DEMONSTRATION=nozzle TOMBOLO_URL=http://127.0.0.1:7070/?token=... TOMBOLO_PID=... node tests/browser/paper.mjs
  *
@@ -13,11 +13,11 @@ import { Failure, Fingers, Keys, Viewer, check, countMeans, launch, link, meansU
 
 const NAME = process.env.TOMBOLO_DEMONSTRATION;
 const browser = await launch();
-const viewer = await Viewer.open(browser, NAME, NAME === "pipe" ? { viewport: { width: 820, height: 1180 }, hasTouch: true } : {});
+const options = NAME === "pipe" ? { viewport: { width: 820, height: 1180 }, hasTouch: true } : {};
+const viewer = await Viewer.open(browser, NAME, options);
+let colleague = null;
 await countMeans(viewer);
 const { page } = viewer;
-const keys = new Keys(viewer);
-const fingers = new Fingers(viewer);
 const bounds = (feature) => page.evaluate((name) => window.tombolo.featureBounds(name), feature);
 const apart = (a, b) => Math.max(...a.flat().map((value, i) => Math.abs(value - b.flat()[i])));
 const known = async () => new Set((await viewer.look()).orders.map((order) => order.id));
@@ -70,30 +70,78 @@ async function asTheyWere(...features) {
   for (const feature of features) await viewer.until(`${feature} where it was`, async () => apart(await bounds(feature), before[feature]) < 1e-4 * Math.max(...sizes(before[feature])));
 }
 
+/** A number of the edit that is in the form. */
+const number = (label) => `.object:not([hidden]) input[aria-label="${label}"]`;
+
+/**
+ * What else is done by the same means as the demonstration, which has been taken back: an edit that is not the last is changed, the wheel
+ * goes to a colleague and comes back, a view is added from a template. `hand` is what is made of a viewer: its keys, its fingers.
+ */
+const more = (hand, { feature, axis, second, changed, expected }) => [
+  ["the first of two edits is changed by the same means", async () => {
+    await applied(() => hand.press("#redo"));
+    await hand.write(number(`factors ${axis}`), second);
+    await applied(() => hand.press("#apply"), await foretold());
+    await viewer.until("two edits", (now) => now.stack.length === 2);
+    await hand.press('#stack [data-edit="0"] [data-act="load"]');
+    await hand.write(number(`factors ${axis}`), changed);
+    const told = await foretold();
+    check((await viewer.text("#apply")) === "Update edit 1", `the button says "${await viewer.text("#apply")}"`);
+    await applied(() => hand.press("#apply"));
+    check(/least quality/.test(told.text), `the page says "${told.text}"`);
+    await scaled(feature, expected);
+    check((await viewer.look()).stack.length === 2, "the second edit is gone");
+    await viewer.picture("first-edit");
+  }],
+  ["the wheel is handed over and comes back by the same means", async () => {
+    colleague = await Viewer.open(browser, "colleague", options);
+    await countMeans(colleague);
+    await colleague.page.goto(link);
+    await colleague.until("watching", (now) => now.role === "watcher" && now.frames > 0);
+    const other = new hand.constructor(colleague);
+    for (const [asks, asksBy, gives, givesBy] of [[colleague, other, viewer, hand], [viewer, hand, colleague, other]]) {
+      await asksBy.press("#wheel");
+      await gives.holds("the question", () => !document.getElementById("asked").hidden);
+      await givesBy.press("#hand-over");
+      await asks.until("the wheel", (now) => now.role === "driver");
+      await gives.until("watching", (now) => now.role === "watcher");
+    }
+    check((await meansUsed(colleague)) === (await meansUsed(viewer)), `the colleague used ${await meansUsed(colleague)}`);
+    await colleague.page.context().close();
+  }],
+  ["a view is added from a template by the same means", async () => {
+    await hand.press("#pipeline-add");
+    await hand.press('[data-template="slice"]');
+    await viewer.holds("a text without errors", () => document.getElementById("pipeline-state").textContent === "No errors.");
+    await hand.press("#pipeline-apply");
+    await viewer.until("the slice", (now) => now.views.slice?.triangles > 0);
+    check((await page.evaluate(() => window.tombolo.pipelines)).some(({ name }) => name === "slice"), "the run has no pipeline of this name");
+    await viewer.picture("slice");
+  }],
+];
+
+const keys = new Keys(viewer);
 const nozzle = [
   ["the throat is made half as high by keys", async () => {
     await measure("throat", "inlet", "outlet");
     // To the foot of the page, and back from there.
-    await keys.to("#to-apply");
-    await keys.press("Enter");
-    await keys.to('input[aria-label="throat: handle"]', "Shift+Tab");
-    await keys.press("Space");
-    await keys.to("#action", "Shift+Tab");
-    for (let options = 0; options < 20 && (await page.inputValue("#action")) !== "scale_direction"; options++) await keys.press("ArrowDown");
+    await keys.press("#to-apply");
+    await keys.press('input[aria-label="throat: handle"]');
+    await keys.to("#action");
+    for (let options = 0; options < 20 && (await page.inputValue("#action")) !== "scale_direction"; options++) await page.keyboard.press("ArrowDown");
     check((await page.inputValue("#action")) === "scale_direction", "the arrow keys do not reach the action");
-    await keys.to('.object:not([hidden]) input[aria-label="factors z"]');
-    await keys.write(0.5);
+    await keys.write(number("factors z"), 0.5);
     const told = await foretold();
-    await keys.to("#apply");
-    await applied(() => keys.press("Enter"), told);
+    await applied(() => keys.press("#apply"), told);
     await scaled("throat", [1, 1, 0.5]);
     await asTheyWere("inlet", "outlet");
     await viewer.picture("applied");
   }],
   ["it is taken back by keys", async () => {
-    await applied(() => keys.press("Control+z"));
+    await applied(() => page.keyboard.press("Control+z"));
     await asTheyWere("throat", "inlet", "outlet");
   }],
+  ...more(keys, { feature: "throat", axis: "z", second: 0.9, changed: 0.8, expected: [1, 1, 0.72] }),
   ["nothing but keys was used", async () => check((await meansUsed(viewer)) === "key", `used: ${await meansUsed(viewer)}`)],
 ];
 
@@ -148,40 +196,38 @@ const bypass = [
 
 /** What makes a section of a pipe larger by a tenth. */
 const WIDER = 1.0488088481701516;
+const fingers = NAME === "pipe" ? new Fingers(viewer) : null;
 const pipe = [
   ["the pipe is widened by a finger", async () => {
     await measure("wall", "outlet", "inlet");
-    // Seen along x, its axis lies across the picture or up it, and no box that is dragged points at the one who looks.
-    await fingers.tap('[data-camera="0"]');
+    // Seen along x, no box that is dragged here points at the one who looks.
+    await fingers.press('[data-camera="0"]');
     await viewer.drawn();
     const place = await viewer.place("wall");
     check(place, "the wall cannot be seen");
-    await fingers.tap(place);
+    await page.touchscreen.tap(...place);
     await viewer.until("the wall as the handle", (now) => now.selection.handle.join() === "wall");
-    await fingers.tap("#right-drawer");
-    await fingers.tap('input[aria-label="outlet: handle"]');
-    await fingers.tap("#right-drawer");
+    await fingers.press('input[aria-label="outlet: handle"]');
+    await fingers.drawer();
     await viewer.drawn();
     const box = await page.evaluate(() => window.tombolo.gizmo["box y"]);
     check(box, "the gizmo has no box y");
     await fingers.drag(box, [14, 0]);
-    await fingers.tap("#right-drawer");
     const dragged = Number(await viewer.field("factors y").inputValue());
     check(dragged > 0 && dragged !== 1, `the finger scales by ${dragged}`);
     await viewer.picture("dragged");
-    for (const axis of ["x", "y"]) await fingers.write(`.object:not([hidden]) input[aria-label="factors ${axis}"]`, WIDER);
+    for (const axis of ["x", "y"]) await fingers.write(number(`factors ${axis}`), WIDER);
     const told = await foretold();
-    await applied(() => fingers.tap("#apply"), told);
+    await applied(() => fingers.press("#apply"), told);
     for (const feature of ["wall", "outlet"]) await scaled(feature, [WIDER, WIDER, 1]);
     await asTheyWere("inlet");
-    await fingers.tap("#right-drawer");
     await viewer.picture("applied");
   }],
   ["it is taken back by a finger", async () => {
-    await fingers.tap("#right-drawer");
-    await applied(() => fingers.tap("#undo"));
+    await applied(() => fingers.press("#undo"));
     await asTheyWere("wall", "outlet", "inlet");
   }],
+  ...more(fingers, { feature: "outlet", axis: "x", second: 0.95, changed: 1.02, expected: [1.02 * 0.95, WIDER, 1] }),
   ["nothing but touch was used", async () => check((await meansUsed(viewer)) === "touch", `used: ${await meansUsed(viewer)}`)],
 ];
 
@@ -214,7 +260,10 @@ const steps = [
     };
     writeFileSync(process.env.TOMBOLO_SHOWN, JSON.stringify(shown, null, 1));
   }],
-  ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
+  ["nothing went wrong on the way", async () => {
+    const complaints = [viewer, colleague].flatMap((one) => one?.complaints ?? []);
+    check(complaints.length === 0, complaints.join("\n"));
+  }],
 ];
 
 await run(steps, () => [viewer], () => browser.close());

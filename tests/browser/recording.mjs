@@ -6,7 +6,7 @@
  *
  * The recording is that of a nozzle whose throat an order pinches to eight tenths about half way. The variables are those of page.mjs.
  */
-import { Viewer, check, launch, link, run } from "./page.mjs";
+import { Fingers, Viewer, check, launch, link, run } from "./page.mjs";
 
 const browser = await launch();
 const viewer = await Viewer.open(browser, "recording");
@@ -75,6 +75,13 @@ const steps = [
     await viewer.until("the moment of behind the order", async ({ stack, cycle: shown }) => stack.length === 1 && shown > last.cycle / 2 && (await cycle()) > last.cycle / 2 && (await stand()) > 0.65);
     await height(0.8);
     check((await viewer.drawn()).pixels !== pixels, "the picture is that of before");
+  }],
+  ["the slider goes with a finger", async () => {
+    const box = await page.locator("#moment").boundingBox();
+    await new Fingers(viewer).drag([box.x + 0.8 * box.width, box.y + box.height / 2], [-0.55 * box.width, 0]);
+    await viewer.until("the moment of before the order", async ({ stack, cycle: shown }) => stack.length === 0 && shown < last.cycle / 2 && (await cycle()) < last.cycle / 2 && (await stand()) > 0.1 && (await stand()) < 0.4);
+    await height(1);
+    await viewer.picture("finger");
   }],
   ["nothing can be ordered of it", async () => {
     const { orders, stack } = await viewer.look();
