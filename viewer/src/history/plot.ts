@@ -119,6 +119,8 @@ export class HistoryPlot implements Tab {
   /** Draws a series of a pin, which was not there before: somebody has asked for it. The monitors stay those that were chosen. */
   choose(key: string): void {
     this.change(key, true);
+    // A run that rests says nothing more that would have it drawn.
+    this.update();
   }
 
   private change(key: string, isDrawn: boolean): void {

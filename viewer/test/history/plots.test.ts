@@ -120,6 +120,21 @@ describe("the plots below the picture", () => {
     expect(kept).toEqual([[]]);
   });
 
+  it("show a pin at once, also where nothing more comes", () => {
+    vi.useFakeTimers();
+    try {
+      const history = new History();
+      const plot = new HistoryPlot(history, null, () => undefined);
+      plot.show(true);
+      history.add("probe 1, pressure", 1, 1, { pressure: 2 });
+      plot.choose(seriesKey("probe 1, pressure", "pressure"));
+      vi.runAllTimers();
+      expect(texts(plot, "tbody th")).toEqual(["probe 1: pressure"]);
+    } finally {
+      vi.useRealTimers();
+    }
+  });
+
   it("say which pin is which, and show the same field at two of them on one axis", () => {
     const history = new History();
     const keys = [1, 2].map((pin) => {
