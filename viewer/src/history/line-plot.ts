@@ -10,7 +10,7 @@ import type { Earlier } from "../picture/earlier";
 import type { Action } from "../store/actions";
 import type { Look } from "../store/looks";
 import { LINE, lineBetween, lineOf, withLine } from "../store/pipelines";
-import { whyNotSteering } from "../store/run";
+import { mayDrive, whyNotSteering } from "../store/run";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 import { axesOf, labelled, padded, roomy, seriesColour } from "./plotting";
@@ -74,6 +74,11 @@ export class LinePlot extends ValuePlot {
 
   /** Asks the run for the fields between two points. */
   take(from: Vector, to: Vector): void {
+    const impossible = this.whyImpossible();
+    if (impossible !== "") {
+      this.store.dispatch({ type: "refused", id: null, text: impossible });
+      return this.follow();
+    }
     const known = this.pipelines.get(LINE);
     if (known && !lineOf(known)) {
       // It is somebody's own, under the name that the plot would use.
@@ -81,6 +86,12 @@ export class LinePlot extends ValuePlot {
     }
     this.pipelines.set(known ? withLine(known, from, to) : lineBetween(from, to));
     this.follow();
+  }
+
+  /** Why the run takes no line for this page, whoever steers; empty where it may. */
+  private whyImpossible(): string {
+    const { state } = this.store;
+    return mayDrive(state) ? "" : `A plot over a line takes a change of the pipelines. ${whyNotSteering(state)}`;
   }
 
   private follow(): void {
@@ -99,7 +110,7 @@ export class LinePlot extends ValuePlot {
     for (const { input } of [...this.ends.from, ...this.ends.to]) input.disabled = why !== "";
     this.remove.disabled = why !== "" || this.line === null;
     this.csv.disabled = this.line === null;
-    write(this.note, this.line === null ? "Choose Line in the toolbar and click two places of the picture; or type two points." : why === "" ? "" : `The line is where the run takes it. ${why}`);
+    write(this.note, this.line === null ? this.whyImpossible() || "Choose Line in the toolbar and click two places of the picture; or type two points." : why === "" ? "" : `The line is where the run takes it. ${why}`);
     this.note.hidden = this.note.textContent === "";
   }
 

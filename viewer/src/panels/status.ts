@@ -37,7 +37,7 @@ export class StatusBar {
   }
 
   private show(state: State): void {
-    const { connection: { state: connection, explanation }, hello, status, end } = state;
+    const { connection: { state: connection, explanation }, hello, status, played, end } = state;
     const pill = part("connection");
     pill.dataset.state = connection;
     write(pill, CONNECTIONS[connection]);
@@ -67,8 +67,10 @@ export class StatusBar {
     write(pause, status?.paused ? "Resume" : "Pause");
 
     if (!status) return;
-    write(part("cycle"), String(status.cycle));
-    write(part("time"), digits(status.time, 5));
+    // A recording is where its slider is; its statuses were seldom told.
+    const { cycle, time } = hello?.recording && played ? played : status;
+    write(part("cycle"), String(cycle));
+    write(part("time"), digits(time, 5));
     write(part("step"), seconds(status.step_seconds));
     const viewers = status.viewers === undefined ? "–" : String(status.viewers);
     write(part("viewers"), viewers);

@@ -15,8 +15,9 @@ const OLD = 3000;
 
 /** How old the picture is and what was left out of it, where the link or the page is too slow for the run; empty where it keeps up. */
 export function slowLink(state: State, now: number): string {
-  const { frames, progress, status } = state;
-  if (runState(state) !== "running" || frames.cycle === null || !status) return "";
+  const { frames, progress, status, hello } = state;
+  // Of a recording a picture may be as old as one likes.
+  if (runState(state) !== "running" || hello?.recording || frames.cycle === null || !status) return "";
   const shown = frames.cycle;
   const reached = progress.find(({ cycle }) => cycle >= shown);
   const age = reached ? now - reached.at : 0;

@@ -57,4 +57,15 @@ describe("the line of the plot", () => {
     expect(asked).toEqual([]);
     expect(store.state.refusal).toContain("“line”");
   });
+
+  it("is not asked of a recording, which says so", async () => {
+    const { store, asked, plot } = await plotted();
+    const moment = { seconds: 0, cycle: 0, time: 0 };
+    store.dispatch({ type: "hello", hello: { ...store.state.hello!, recording: { first: moment, last: moment } } });
+    plot.take([0, 0, 0], [1, 0, 0]);
+    expect(asked).toEqual([]);
+    expect(store.state.refusal).toBe("A plot over a line takes a change of the pipelines. This is a recording: it can be watched, and not be steered.");
+    expect([...plot.body.querySelectorAll("input")].map(({ value }) => value)).toEqual(["", "", "", "", "", ""]);
+    expect(plot.body.textContent).toContain(store.state.refusal);
+  });
 });

@@ -26,6 +26,15 @@ describe("the bar", () => {
     expect([at("pause").disabled, at("pause").title]).toEqual([true, "The run has ended."]);
   });
 
+  it("says where a recording is, whatever its last status was", () => {
+    const moment = { seconds: 0, cycle: 3, time: 0.5 };
+    made.greet({ recording: { first: moment, last: moment } });
+    made.store.dispatch({ type: "status", status: { ...STATUS, cycle: 4500 }, at: 0 });
+    made.store.dispatch({ type: "played", played: { ...moment, speed: 1, paused: true, at_end: false } });
+    expect([at("cycle").textContent, at("time").textContent]).toEqual(["3", "0.5"]);
+    expect(at("silence").hidden).toBe(true);
+  });
+
   it("does not claim that a run goes on when the connection is lost", () => {
     made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "The connection was lost." });
     expect(at("run").textContent).toBe("unknown");

@@ -527,6 +527,10 @@ describe("who steers, and how the run stands", () => {
     // Frames come late, and every third of them alone.
     expect(at(11, 190)).toBe("");
     expect(at(14, 210)).toMatch(/^The picture is behind: 3 s old, 30 cycles; 1 of the last \d+ frames were left out\.$/);
+    // Of a recording one may look at what was long ago.
+    const moment = { seconds: 0, cycle: 0, time: 0 };
+    store.dispatch({ type: "hello", hello: { ...store.state.hello!, recording: { first: moment, last: moment } } });
+    expect(slowLink(store.state, 14_000)).toBe("");
     // One that comes seldom is not late.
     const seldom = page().store;
     seldom.dispatch({ type: "frame", view: "cut", cycle: 0 });
