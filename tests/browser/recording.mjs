@@ -1,15 +1,16 @@
 /**
  * Watches a recording that `tombolo play` shows, in Debian's Chromium: it goes on by itself to its end, the slider is dragged back and
- * forth, and nothing can be ordered.
+ * forth by hand and by keys, what is seen can be measured as in a run, and nothing can be ordered.
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/recording.mjs
  *
  * The recording is that of a nozzle whose throat an order pinches to eight tenths about half way. The variables are those of page.mjs.
  */
+import { statSync } from "node:fs";
 import { Fingers, Viewer, check, launch, link, run } from "./page.mjs";
 
 const browser = await launch();
-const viewer = await Viewer.open(browser, "recording");
+const viewer = await Viewer.open(browser, "recording", { acceptDownloads: true });
 const { page } = viewer;
 const button = (text) => viewer.holds(`the button "${text}"`, (wanted) => document.getElementById("play").textContent === wanted, text);
 /** Where the slider stands, from 0 at its beginning to 1 at its end. */
@@ -76,6 +77,56 @@ const steps = [
     await height(0.8);
     check((await viewer.drawn()).pixels !== pixels, "the picture is that of before");
   }],
+  ["the same tools serve as in a run: pins, ruler, histogram, before and after, film, and the slider by keys", async () => {
+    await page.mouse.move(...(await viewer.place("throat")));
+    await viewer.holds("the value beside the pointer", () => /^throat\n/.test(document.getElementById("tip").innerText));
+    await page.keyboard.press("p");
+    await viewer.holds("the pin", () => document.querySelectorAll("#marks circle.probe").length === 1);
+    await viewer.holds("the pin in the plot", () => [...document.querySelectorAll("#dock tbody th")].some((name) => /^\s*(probe )?1: /.test(name.textContent)));
+    await page.locator("#scene").press("m");
+    for (const feature of ["upstream", "downstream"]) await page.mouse.click(...(await viewer.place(feature)));
+    const distance = await viewer.holds("the distance", () => document.querySelector("#marks text.ruler")?.textContent);
+    check(Number.parseFloat(distance) > 0.2 && Number.parseFloat(distance) < 1.06, `the ruler says ${distance}`);
+    await page.locator("#scene").press("m");
+    await page.getByRole("tab", { name: "Histogram" }).click();
+    const bins = () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length >= 1;
+    await viewer.holds("the histogram", bins);
+    await page.click("#compare");
+    await viewer.holds("the moment before the order", () => /^before /.test(document.querySelector("#before .caption")?.textContent ?? ""));
+    await viewer.picture("tools");
+    await viewer.clean("with the tools");
+    await page.click("#compare");
+    // What is filmed changes by the slider, which the keys move.
+    await page.click("#movie");
+    await page.focus("#moment");
+    for (const [key, isThere] of [["ArrowLeft", (now, before) => now < before], ["ArrowRight", (now, before) => now > before]]) {
+      const before = await cycle();
+      // A step of the slider may be less than one of the recording.
+      for (let press = 0; press < 6; press++) await page.keyboard.press(key);
+      await viewer.until(`another moment by ${key}`, async () => isThere(await cycle(), before));
+    }
+    const waiting = page.waitForEvent("download");
+    await page.click("#movie");
+    const { size } = statSync(await (await waiting).path());
+    check(size > 1000, `the film has ${size} bytes`);
+    await page.focus("#moment");
+    await page.keyboard.press("Home");
+    await viewer.until("its beginning", async ({ stack }) => (await stand()) < 0.001 && stack.length === 0);
+    await height(1);
+  }],
+  ["what needs the run is said in words", async () => {
+    const why = "This is a recording: it can be watched, and not be steered.";
+    const quality = page.getByRole("button", { name: "Colour by mesh quality" });
+    check(await quality.isDisabled() && (await quality.getAttribute("title")) === why, "the quality of the mesh is offered");
+    const refused = (what) => viewer.holds(what, (words) => { const said = document.getElementById("refusal"); return !said.hidden && said.textContent.includes(words) && said.textContent; }, why);
+    await page.click("#quality");
+    const cells = await refused("why there are no worst cells");
+    await page.locator("#scene").press("l");
+    for (const feature of ["upstream", "downstream"]) await page.mouse.click(...(await viewer.place(feature)));
+    await viewer.holds("other words", (before) => document.getElementById("refusal").textContent !== before, cells);
+    console.log(`    ${cells} | ${await refused("why there is no line")}`);
+    await viewer.picture("words");
+  }],
   ["the slider goes with a finger", async () => {
     const box = await page.locator("#moment").boundingBox();
     await new Fingers(viewer).drag([box.x + 0.8 * box.width, box.y + box.height / 2], [-0.55 * box.width, 0]);
@@ -91,7 +142,7 @@ const steps = [
     for (const selector of ["#wheel", "#pipelines-panel"]) check(await page.locator(selector).isHidden(), `${selector} is offered`);
     await page.focus("#scene");
     await page.keyboard.press("Control+z");
-    await page.waitForTimeout(300);
+    // An order is listed by the page before it is sent.
     const seen = await viewer.look();
     check(JSON.stringify([seen.orders, seen.stack]) === JSON.stringify([orders, stack]), "Ctrl+Z took something back");
     check(seen.errors.length === 0, JSON.stringify(seen.errors));
