@@ -1,7 +1,6 @@
 // @vitest-environment jsdom
 import type uPlot from "uplot";
 import { beforeEach, describe, expect, it, vi } from "vitest";
-import type { DataFrame, TopologyFrame } from "../../src/connection/protocol";
 import { HistogramPlot } from "../../src/history/histogram-plot";
 import { Earlier } from "../../src/picture/earlier";
 import type { Content } from "../../src/picture/earlier";
@@ -22,11 +21,11 @@ vi.mock("uplot", () => ({
 /** Two triangles, of which the second is three times as large. */
 const content = (cycle: number, ...values: number[]): Content & { name: string } => ({
   name: "cut",
-  topology: { kind: "topology", view: "cut", topology: "1", points: 6, triangles: Uint32Array.of(0, 1, 2, 3, 4, 5), triangleFeatures: null, lines: new Uint32Array(0) } as TopologyFrame,
+  topology: { kind: "topology", view: "cut", topology: "1", points: 6, triangles: Uint32Array.of(0, 1, 2, 3, 4, 5), triangleFeatures: null, lines: new Uint32Array(0) },
   frame: {
     kind: "data", view: "cut", topology: "1", cycle, time: cycle, points: Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0, 3, 0, 0, 0, 1, 0),
     fields: [{ name: "p", association: "element", components: 1, values: Float64Array.from(values) }],
-  } as DataFrame,
+  },
 });
 
 describe("the histogram", () => {
