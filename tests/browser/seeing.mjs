@@ -215,8 +215,22 @@ const steps = [
   }],
   ["what was chosen comes back with a reload", async () => {
     await page.click("#theme");
+    await page.click('[data-camera="parallel"]');
+    await page.locator("#scene").press("Shift+ArrowLeft");
+    await page.check('input[aria-label="throat: handle"]');
+    await viewer.field("factors z").fill("0.9");
+    await until("a preview", () => window.tombolo.preview.state === "shown");
+    const stood = () => page.evaluate(() => JSON.stringify([window.tombolo.camera, window.tombolo.selection]));
+    const before = await stood();
     await page.reload();
     await until("a picture again", () => window.tombolo?.frames > 0);
+    check((await page.locator('[data-camera="parallel"]').getAttribute("aria-pressed")) === "true", "the button of the projection forgot it");
+    await until("what stood in the form", () => window.tombolo.preview.state === "shown");
+    check((await viewer.field("factors z").inputValue()) === "0.9", `the form holds ${await viewer.field("factors z").inputValue()}`);
+    check((await stood()) === before, `camera and handle are ${await stood()}, and were ${before}`);
+    await page.click("#cancel");
+    await page.click('[data-camera="parallel"]');
+    await page.click('[data-camera="reset"]');
     check((await page.evaluate(() => document.documentElement.dataset.theme)) === "light", "the theme was forgotten");
     check(await page.evaluate(() => [...document.querySelectorAll("#look select")].some((select) => select.value === "fixed")), "the range was forgotten");
     // The pin is looked for anew; as long as there is one, its view is sent.
