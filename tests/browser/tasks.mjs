@@ -48,6 +48,31 @@ const steps = [
     await page.setViewportSize({ width: 1280, height: 800 });
     await viewer.drawn();
   }],
+  ["what would swing the ends away is not approved without a word", async () => {
+    const ends = ["inlet", "outlet"];
+    await page.selectOption("#action", "rotate");
+    await page.check('input[aria-label="bypass: handle"]');
+    for (const end of ends) await page.uncheck(`input[aria-label="${end}: fixed"]`);
+    await viewer.field("degrees").fill("20");
+    const words = await viewer.holds("what would move", () => { const said = document.getElementById("open-moved"); return !said.hidden && said.innerText; });
+    check(/^(inlet \(inflow\)|outlet \(outflow\)) would move by \S+, \S+ % of the size, and (inlet|outlet) too\.$/.test(words), `the page says "${words}"`);
+    const [said, button, amber] = await page.evaluate(() => {
+      const swatch = document.body.appendChild(document.createElement("span"));
+      swatch.style.color = "var(--low-text)";
+      const colours = [...["open-moved", "apply"].map((id) => document.getElementById(id)), swatch].map((one) => getComputedStyle(one).color);
+      swatch.remove();
+      return colours;
+    });
+    check(said === amber && button === amber, `the word is ${said}, the button ${button}, not ${amber}`);
+    await told();
+    check((await viewer.text("#apply")) === "Apply anyway", `the button says "${await viewer.text("#apply")}"`);
+    await filmed("ends-would-move", "right");
+    await page.click("#cancel");
+    check(await page.isHidden("#open-moved") && (await viewer.text("#apply")) === "Apply", "the warning is still there after Cancel");
+    for (const end of ends) await page.check(`input[aria-label="${end}: fixed"]`);
+    await page.uncheck('input[aria-label="bypass: handle"]');
+    check((await viewer.look()).orders.length === 0, "an order was given");
+  }],
   ["the graft is bent by 20 degrees", async () => {
     await page.click("#skeleton");
     await viewer.holds("the nodes of the skeleton", () => window.tombolo.skeleton?.places.length > 0);
@@ -71,7 +96,7 @@ const steps = [
     await viewer.until("the worst cells gone", (now) => !("worst cells" in now.views));
   }],
   ["the pressure before and after stands beside the plot", async () => {
-    await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /pressure/i.test(row.textContent) && /%/.test(row.textContent)));
+    await viewer.holds("before and after", () => [...document.querySelectorAll("#dock tbody tr")].some((row) => /^Pressure drop \[Pa\]$/.test(row.cells[0].innerText) && Number.parseFloat(row.cells[1].innerText) > 0 && Number.parseFloat(row.cells[2].innerText) > 0 && /%/.test(row.cells[3].innerText)));
     await filmed("pressure");
     // The same by the keyboard: another cycle, closer, the whole again.
     await page.focus('#dock [role="slider"]');
@@ -122,8 +147,7 @@ const steps = [
     }
     await colleague.until("no edits", (now) => now.stack.length === 0);
     await viewer.until("no edits here either", (now) => now.stack.length === 0);
-    await colleague.drawn();
-    await colleague.picture("taken-back");
+    await colleague.filmed("taken-back", "right");
   }],
   ["one view alone, for a page of one's own", async () => {
     const bare = new URL(page.url());
