@@ -1,6 +1,7 @@
 /**
  * Changes the shape of a running nozzle as two people would, in Debian's Chromium, over a line that the run itself encrypts: whom the
- * browser talks to, what is safe at first, a refused order and each of its remedies, an earlier edit changed, taking back by keys, the
+ * browser talks to, what is safe at first, a refused order and each of its remedies, the page loaded again in mid-order, an earlier edit
+ * changed, edits reordered, renamed, deleted, an order cancelled, taking back by keys, the
  * wheel handed over, and the end of the run.
  *
  *     TOMBOLO_URL="https://127.0.0.1:7070/?token=...#sha256=..." TOMBOLO_PID=... node tests/browser/shape.mjs
@@ -33,6 +34,11 @@ const scheduled = async (shapes, every) => {
   if (!(await steps.isVisible())) await page.click(".schedule summary");
   await steps.fill(String(shapes));
   await page.getByLabel("schedule every", { exact: true }).first().fill(String(every));
+};
+/** Has the run rest, or go on. */
+const rests = async (paused) => {
+  await page.click("#pause");
+  await first.until(paused ? "the run paused" : "the run going on", (now) => now.status?.paused === paused);
 };
 /** Takes the only edit back. */
 const takenBack = async () => {
@@ -199,10 +205,6 @@ const steps = [
       check((await row.count()) === 1 && (await row.getAttribute("data-status")) === status && said.test(await row.innerText()), `the order is ${status}, its row says "${await row.allInnerTexts()}"`);
       return row;
     };
-    const rests = async (paused) => {
-      await page.click("#pause");
-      await first.until(paused ? "the run paused" : "the run going on", (now) => now.status?.paused === paused);
-    };
     await rests(true);
     await page.selectOption("#action", "translate");
     await first.field("by y").fill("0.02");
@@ -242,6 +244,43 @@ const steps = [
     check((await first.apply()).status === "applied", "the change was refused");
     await listed("Throat: height × 0.9", "Throat: moved by 0.01 along z");
     await first.until("the throat as changed", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 0.9) < 0.005);
+  }],
+  ["edits are dragged into another order, renamed and deleted", async () => {
+    const [pinch, way] = ["Throat: height × 0.9", "Throat: moved by 0.01 along z"];
+    const row = (index, act) => `#stack [data-edit="${index}"] ${act}`;
+    const applied = async (what, act) => check((await given(act)).status === "applied", `${what} was refused`);
+    await applied("the other order", () => page.dragAndDrop(row(1, ".grip"), row(0, ".grip")));
+    await listed(way, pinch);
+    await first.picture("reordered");
+    await applied("the order of before", () => page.dragAndDrop(row(0, ".grip"), row(1, ".grip")));
+    await listed(pinch, way);
+    await page.click(row(0, '[data-act="rename"]'));
+    await page.keyboard.type("Narrow");
+    await applied("the name", () => page.keyboard.press("Enter"));
+    await listed("Narrow", way);
+    check((await first.look()).stack[0].scale_direction.name === "Narrow", "the run has not the name");
+    await applied("what is left", () => page.click(row(0, '[data-act="remove"]')));
+    await listed(way);
+    await first.until("the throat without what was deleted", async () => Math.abs((await first.extent("throat", 2)) / first.whole - 1) < 0.005);
+    await applied("the edit brought back", () => page.click("#undo"));
+    await listed("Narrow", way);
+  }],
+  ["an order that waits is cancelled, and nothing comes of it", async () => {
+    const { stack } = await first.look();
+    await rests(true);
+    await page.selectOption("#action", "translate");
+    await first.field("by y").fill("0.02");
+    const order = await given(async () => {
+      await page.click("#apply");
+      await page.click("#pending button.cancel");
+    });
+    check(order.status === "rejected" && /cancel/.test(order.reason), `the order is ${order.status}: ${order.reason}`);
+    check(/refused/.test(await first.text(`#pending [data-order="${order.id}"]`)), "the row does not say it");
+    await first.picture("cancelled");
+    await rests(false);
+    const { cycle } = (await first.look()).status;
+    await first.until("later cycles", (now) => now.status.cycle > cycle + 20);
+    check(JSON.stringify((await first.look()).stack) === JSON.stringify(stack), "a cancelled order has left an edit");
   }],
   ["muting keeps the focus, and keys take back and bring back, before Apply and after", async () => {
     const known = () => first.look().then((now) => new Set(now.orders.map((order) => order.id)));
