@@ -233,10 +233,9 @@ fn small(stream: &Value, options: &[&str]) -> (Small, Run) {
             {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
         ]}),
     );
+    let mut arguments = vec!["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0"];
     // A core is left to the browser.
-    let options_of_all =
-        ["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0", "--threads", "1"];
-    let mut arguments = options_of_all.to_vec();
+    arguments.extend(["--threads", "1"]);
     arguments.extend(options);
     let run = Run::flow(&small.arguments(&arguments));
     (small, run)

@@ -1,8 +1,7 @@
 /**
  * Changes the shape of a running nozzle as two people would, in Debian's Chromium, over a line that the run itself encrypts: whom the
  * browser talks to, what is safe at first, a refused order and each of its remedies, the page loaded again in mid-order, an earlier edit
- * changed, edits reordered, renamed, deleted, an order cancelled, taking back by keys, the
- * wheel handed over, and the end of the run.
+ * changed, edits reordered, renamed and deleted, an order cancelled, taking back by keys, the wheel handed over, and the end of the run.
  *
  *     TOMBOLO_URL="https://127.0.0.1:7070/?token=...#sha256=..." TOMBOLO_PID=... node tests/browser/shape.mjs
  *
@@ -275,7 +274,7 @@ const steps = [
       await page.click("#pending button.cancel");
     });
     check(order.status === "rejected" && /cancel/.test(order.reason), `the order is ${order.status}: ${order.reason}`);
-    check(/refused/.test(await first.text(`#pending [data-order="${order.id}"]`)), "the row does not say it");
+    check(/cancelled/.test(await first.text(`#pending [data-order="${order.id}"]`)), "the row does not say that it was cancelled");
     await first.picture("cancelled");
     await rests(false);
     const { cycle } = (await first.look()).status;
