@@ -131,6 +131,8 @@ function canvasOfPage(): Canvas {
     return makeCanvas();
   } catch (error) {
     connection.stop();
+    // Nothing of the page is there yet but its words.
+    document.body.dataset.embedded = "true";
     showEmpty("This browser cannot draw the picture", "It has no WebGL 2, or it is switched off. Any current Chrome, Firefox, Edge or Safari has it.");
     throw error;
   }
