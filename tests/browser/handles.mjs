@@ -217,6 +217,8 @@ const steps = [
     check(count > 10, `${count} faces are chosen`);
     await picture("lasso");
     await viewer.clean("with faces chosen");
+    const small = await viewer.small();
+    check(small.length === 0, `with faces chosen these are smaller than 24 px: ${small.join(", ")}`);
     // Taken back, the next tool begins with nothing.
     const taken = async (tool, stroke) => {
       await page.getByRole("button", { name: "Clear", exact: true }).click();

@@ -34,10 +34,11 @@ export const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(t
 const gallery = process.env.TOMBOLO_GALLERY ?? fileURLToPath(new URL("../../target/gallery", import.meta.url));
 for (const directory of [screenshots, gallery]) mkdirSync(directory, { recursive: true });
 
-export const launch = () => chromium.launch({
+/** The browser; `more` are further switches of it. */
+export const launch = (...more) => chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
   args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more],
 });
 
 /** The sizes of page that a task is filmed at; the last is that of a page that is opened. */

@@ -1,6 +1,7 @@
 /**
  * Looks at a running nozzle as a person would, in Debian's Chromium: on a narrow page and a wide one, in light and dark; moves the
- * camera, a slice and the range of the colours, reads and pins a place, reloads, and turns a picture of very many triangles.
+ * camera, a slice and the range of the colours, reads and pins a place, reloads, and turns a picture of very many triangles. Then it has
+ * the page in troubles.
  *
  *     TOMBOLO_URL=http://127.0.0.1:7070/?token=... node tests/browser/seeing.mjs
  *
@@ -8,6 +9,7 @@
  */
 import { readFileSync } from "node:fs";
 import { Viewer, check, launch, link, run } from "./page.mjs";
+import { troubles } from "./troubles.mjs";
 
 const browser = await launch();
 const viewer = await Viewer.open(browser, "seeing", { colorScheme: "dark" });
@@ -312,6 +314,7 @@ const steps = [
     for (const button of ["icon", "small"]) await page.click(`#pipelines li[data-pipeline="many"] .${button}[data-act="remove"]`);
     await until("the view gone", () => !("many" in window.tombolo.views));
   }],
+  ...troubles(browser, viewer),
   ["nothing went wrong on the way", async () => check(viewer.complaints.length === 0, viewer.complaints.join("\n"))],
 ];
 

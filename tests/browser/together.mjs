@@ -94,6 +94,8 @@ const steps = [
     check(await bo.page.locator("#refusal").isHidden(), "to have to wait counts as an error");
     await anna.picture("people");
     await anna.clean("asked");
+    const small = await anna.small();
+    check(small.length === 0, `with the people shown these are smaller than 24 px: ${small.join(", ")}`);
     await anna.page.click('#people-list li:nth-child(2) [data-act="hand-over"]');
     await bo.until("the wheel", (seen) => seen.role === "driver");
     check(await bo.page.locator("#waiting").isHidden(), "an answer is still waited for");
