@@ -198,7 +198,7 @@ const steps = [
     }
     await cancel();
   }],
-  ["a lasso chooses faces as the region", async () => {
+  ["lasso, brush, rectangle and angle choose faces as the region", async () => {
     await page.click("#faces");
     const box = await page.locator("#scene").boundingBox();
     const [cx, cy] = [box.x + box.width / 2, box.y + box.height / 2];
