@@ -13,6 +13,8 @@ interface Key { key: string; shiftKey: boolean; ctrlKey: boolean; altKey: boolea
 const NAMES: Readonly<Record<string, string>> = { "←": "ArrowLeft", "→": "ArrowRight", "↑": "ArrowUp", "↓": "ArrowDown", "−": "-", Esc: "Escape" };
 /** Keys of a handle in the picture, which another test presses (`handles/gesture.test.ts` those of a drag). */
 const OF_HANDLES = ["G", "T", "E"];
+/** Keys of the history alone, which `history/plots.test.ts` presses. */
+const OF_HISTORY = ["0"];
 /** Another way to write one that is listed, where a keyboard has it without shift. */
 const ALIKE: Readonly<Record<string, string>> = { "=": "+" };
 
@@ -76,7 +78,7 @@ describe("the sheet of keys", () => {
   it("has every key that does something, and none that does nothing", () => {
     const listed = new Set([...document.querySelectorAll("#keys kbd")].map(({ textContent }) => textContent));
     const doing = new Set([...keys()].filter(isHandled).map(written));
-    for (const name of OF_HANDLES) {
+    for (const name of [...OF_HANDLES, ...OF_HISTORY]) {
       expect(doing.has(name), name).toBe(false);
       doing.add(name);
     }
