@@ -274,7 +274,8 @@ const steps = [
       await page.click("#pending button.cancel");
     });
     check(order.status === "rejected" && /cancel/.test(order.reason), `the order is ${order.status}: ${order.reason}`);
-    check(/cancelled/.test(await first.text(`#pending [data-order="${order.id}"]`)), "the row does not say that it was cancelled");
+    const row = await first.text(`#pending [data-order="${order.id}"]`);
+    check(/cancelled/.test(row) && /by you/.test(row) && !/refused/.test(row), `the row of the cancelled order says "${row}"`);
     await first.picture("cancelled");
     await rests(false);
     const { cycle } = (await first.look()).status;

@@ -10,15 +10,18 @@ import type { Action } from "../store/actions";
 import type { Commands } from "../store/commands";
 import { kindOf, partsOf } from "../store/draft";
 import { asFormOrder, isCancellable, isPending, isRedoable, isRefused, move, provenance, remove, rename, toggleMute, undoable, whyNotEditable } from "../store/edits";
-import { whyNotSteering } from "../store/run";
+import { withdrawalOf } from "../store/orders";
+import type { Withdrawal } from "../store/orders";
+import { nameOf, whyNotSteering } from "../store/run";
 import type { OrderPhase, OrderRecord, State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { floored, passingPart, percent } from "../store/verdict";
 
 const REFUSED_SHOWN = 3;
-const PHASES: Record<OrderPhase, string> = {
+const PHASES: Record<OrderPhase | Withdrawal["how"], string> = {
   sent: "sent", accepted: "waiting", computing: "computing", applying: "applying", applied: "applied", rejected: "refused", lost: "lost",
+  cancelled: "cancelled", replaced: "replaced",
 };
 
 export class EditsPanel {
@@ -33,7 +36,7 @@ export class EditsPanel {
   private announced = new Map<string, OrderPhase>();
 
   constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
-    const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.draft.updating, whyNotEditable(state), state.form];
+    const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.draft.updating, whyNotEditable(state), state.form, state.people];
     store.watch(seen, () => this.show(), (a, b) => (a as unknown[]).every((value, i) => Object.is(value, (b as unknown[])[i])));
     store.watch((state) => state.orders, (orders) => this.announce(orders));
     store.watch(undoState, (now) => this.showUndo(now), sameJson);
@@ -62,7 +65,7 @@ export class EditsPanel {
       ...state.orders.filter((order) => isRefused(order) && !order.dismissed).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
     part("history").hidden = state.orders.length === 0;
     write(part("history-title"), `Everything that happened (${state.orders.length})`);
-    this.history.replaceChildren(...[...state.orders].reverse().map(historyRow));
+    this.history.replaceChildren(...[...state.orders].reverse().map((order) => historyRow(order, state)));
     if (focus && !isTyping) (this.list.querySelector<HTMLElement>(focus.exact) ?? this.list.querySelector<HTMLElement>(focus.near) ?? part("undo")).focus();
   }
 
@@ -208,16 +211,16 @@ export class EditsPanel {
     if (order.status === "applying") done.style.width = `${100 * fraction}%`;
     const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, done);
     return element("li", { "data-order": order.id, "data-status": order.status },
-      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
+      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order)),
         steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
-      bar, element("div", { class: "detail" }, detailOf(order)));
+      bar, element("div", { class: "detail" }, detailOf(order, this.store.state)));
   }
 
   private refusedRow(order: OrderRecord): HTMLElement {
-    return element("li", { "data-order": order.id, "data-status": order.status },
-      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, PHASES[order.status] ?? order.status),
+    return element("li", { "data-order": order.id, "data-status": outcomeStatus(order) },
+      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order)),
         element("button", { type: "button", class: "icon", title: "Take it off the list", "aria-label": `Dismiss: ${order.text}`, onclick: () => this.store.dispatch({ type: "order dismissed", id: order.id }) }, "×")),
-      element("div", { class: "detail" }, detailOf(order)), element("div", { class: "ways" }, ...this.waysBack(order)));
+      element("div", { class: "detail" }, detailOf(order, this.store.state)), element("div", { class: "ways" }, ...this.waysBack(order)));
   }
 
   /** The ways from a refused order back into the form, where the form can hold it: as it was, or as much of it as would pass. */
@@ -250,17 +253,19 @@ export class EditsPanel {
     for (const order of this.store.state.orders) {
       if (!isPending(order) || order.status === "applying") continue;
       const shown = [...this.pending.children].find((row) => (row as HTMLElement).dataset.order === order.id)?.querySelector(".detail");
-      if (shown) write(shown, detailOf(order));
+      if (shown) write(shown, detailOf(order, this.store.state));
     }
   }
 
   private announce(orders: readonly OrderRecord[]): void {
-    for (const { id, status, text, reason, not_followed: lost } of orders) {
+    for (const order of orders) {
+      const { id, status, text, reason } = order;
       if (this.announced.get(id) === status) continue;
       const isNew = this.announced.size > 0 || status === "sent";
       this.announced.set(id, status);
       if (isNew && (status === "applied" || status === "rejected")) {
-        write(part("announcer"), `${text}: ${PHASES[status]}${lost ? ", not followed" : ""}${reason ? `, ${reason}` : ""}`);
+        const why = withdrawalOf(order) ? ` ${detailOf(order, this.store.state)}` : reason ? `, ${reason}` : "";
+        write(part("announcer"), `${text}: ${phaseOf(order)}${why}`);
       }
     }
     if (this.announced.size > 1000) this.announced = new Map(orders.map(({ id, status }) => [id, status]));
@@ -277,14 +282,18 @@ function partsName(edit: Json): string {
   return typeof name === "string" ? name : "";
 }
 
-function historyRow(order: OrderRecord): HTMLElement {
-  return element("li", { "data-status": order.status },
+function historyRow(order: OrderRecord, state: State): HTMLElement {
+  return element("li", { "data-status": outcomeStatus(order) },
     element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order))),
-    element("div", { class: "detail" }, detailOf(order)));
+    element("div", { class: "detail" }, detailOf(order, state)));
 }
 
+/** An order that somebody took back was not refused. */
+const outcomeStatus = (order: OrderRecord): OrderPhase | Withdrawal["how"] => withdrawalOf(order)?.how ?? order.status;
+
 function phaseOf(order: OrderRecord): string {
-  return (PHASES[order.status] ?? String(order.status)) + (order.not_followed ? ", not followed" : "");
+  const status = outcomeStatus(order);
+  return (PHASES[status] ?? String(status)) + (order.not_followed ? ", not followed" : "");
 }
 
 /** What became of an applied order, in a few words. */
@@ -296,7 +305,13 @@ function outcomeOf(order: OrderRecord): string {
   return parts.join(" · ");
 }
 
-export function detailOf(order: OrderRecord): string {
+function withdrawnBy({ how, by }: Withdrawal, state: State): string {
+  const person = by === null ? null : nameOf(state, by);
+  if (how === "cancelled") return person === null ? "" : `by ${person}`;
+  return `by another order${person === null ? "" : `, given by ${person}`}`;
+}
+
+export function detailOf(order: OrderRecord, state: State): string {
   const waited = order.sentAt === null ? "" : ` · ${Math.round((performance.now() - order.sentAt) / 1000)} s`;
   switch (order.status) {
     case "sent": return `waiting for the simulation${waited}`;
@@ -304,7 +319,10 @@ export function detailOf(order: OrderRecord): string {
     case "computing": return `moving the mesh and checking every shape on the way${waited}`;
     case "applying": return `shape ${order.shape ?? "?"} of ${order.shapes ?? "?"}`;
     case "lost": return order.reason ?? "";
-    case "rejected": return order.reason ?? "no reason was given";
+    case "rejected": {
+      const withdrawal = withdrawalOf(order);
+      return withdrawal ? withdrawnBy(withdrawal, state) : order.reason ?? "no reason was given";
+    }
     case "applied": {
       const parts = [`at cycle ${order.cycle_applied ?? "?"}`];
       const not = order.not_followed;

@@ -37,6 +37,15 @@ export function ordersReconciled(orders: readonly OrderRecord[], statuses: reado
   return told.map((order) => (order.status === "sent" && !known.has(order.id) ? { ...order, status: "lost" as const, reason } : order));
 }
 
+/** How somebody took an order back: alone, or by another order in its place; `by` is the viewer that did, null where it was none. */
+export interface Withdrawal { how: "cancelled" | "replaced"; by: string | null }
+
+/** Only its reason tells an order that was taken back from one that was refused; null for any other. */
+export function withdrawalOf({ status, reason }: OrderRecord): Withdrawal | null {
+  const [, how, by] = (status === "rejected" ? /^(cancelled|replaced)(?: by order .+?)?(?: by (c\d+))?$/.exec(reason ?? "") : null) ?? [];
+  return how === "cancelled" || how === "replaced" ? { how, by: by ?? null } : null;
+}
+
 /** Whether the shape is on its way to another: an order is being computed or carried out. */
 export const isShapeUnderWay = (orders: readonly OrderRecord[]): boolean => orders.some(({ status }) => status === "computing" || status === "applying");
 

@@ -37,6 +37,9 @@ export function titleOf({ people }: Pick<State, "people">, client: string): stri
   return name ? `${name} (${client})` : `viewer ${client}`;
 }
 
+/** Who a viewer is to the person at this one. */
+export const nameOf = (state: Pick<State, "people" | "hello">, client: string): string => (client === state.hello?.client ? "you" : titleOf(state, client));
+
 /** A text with a capital letter at its beginning. */
 export const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
 

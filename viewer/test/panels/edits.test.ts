@@ -199,6 +199,27 @@ describe("the list of edits", () => {
     expect(document.querySelector("#orders")!.textContent).toMatch(/cells invert/);
   });
 
+  it("does not call what somebody took back refused, and says who did", () => {
+    const rejected = (id: string, reason: string): void => made.store.dispatch({ type: "order", status: { id, status: "rejected", order: { edits: [shift(9)] }, reason } });
+    const told = (id: string): (string | undefined)[] => {
+      const row = document.querySelector<HTMLElement>(`#pending [data-order="${id}"]`)!;
+      return [row.dataset.status, row.querySelector(".chip")!.textContent, row.querySelector(".detail")!.textContent];
+    };
+    rejected("o1", "cancelled by c1");
+    expect(told("o1")).toEqual(["cancelled", "cancelled", "by you"]);
+    expect(document.querySelector<HTMLElement>("#orders li")!.dataset.status).toBe("cancelled");
+    rejected("o2", "cancelled by c2");
+    expect(document.getElementById("announcer")!.textContent).toBe("Wall: moved by 9 along x: cancelled by viewer c2");
+    made.store.dispatch({ type: "people", viewers: [{ client: "c2", name: "Anna", role: "watcher", may_drive: true }] });
+    expect(told("o2")).toEqual(["cancelled", "cancelled", "by Anna (c2)"]);
+    rejected("o3", "cancelled");
+    rejected("o4", "replaced by order o5 by c1");
+    rejected("o5", "cell 1 would invert; cancelled by c1");
+    expect([told("o3"), told("o4"), told("o5")]).toEqual([
+      ["cancelled", "cancelled", ""], ["replaced", "replaced", "by another order, given by you"], ["rejected", "refused", "cell 1 would invert; cancelled by c1"],
+    ]);
+  });
+
   it("brings a refused order back into the form, as it was or as much of it as would pass", () => {
     const orderOf = (id: string, order: Json, fraction: number | null): void => made.store.dispatch({ type: "order", status: { id, status: "rejected", order, reason: "cells invert", fraction } });
     const ways = (id: string): string[] => [...document.querySelectorAll(`#pending [data-order="${id}"] .ways button`)].map(({ textContent }) => textContent);
