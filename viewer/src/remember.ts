@@ -7,7 +7,7 @@ import type { WorstCells } from "./panels/quality";
 import type { Camera } from "./picture/camera";
 import type { Pins } from "./picture/pins";
 import type { Action } from "./store/actions";
-import { LONGEST_HISTORY } from "./store/kept";
+import { LONGEST_HISTORY, LONGEST_ORDER } from "./store/kept";
 import type { KeptRun } from "./store/kept";
 import { draftToKeep } from "./store/kept-draft";
 import type { State } from "./store/state";
@@ -54,7 +54,7 @@ export class Memory {
     if (kept.isParallel) camera.parallel = true;
     if (kept.camera) camera.stand = kept.camera;
     worst.restore(kept.isWorstOwn);
-    this.store.dispatch({ type: "remembered", chosenView: kept.chosenView, draft: kept.draft });
+    this.store.dispatch({ type: "remembered", chosenView: kept.chosenView, draft: kept.draft, dismissed: kept.dismissed });
     this.waiting = SWITCHES.filter((id) => (id === "skeleton" ? kept.isSkeletonShown : kept.isCompared));
     if (this.waiting.length > 0) this.parts.whenDrawn(() => this.switchOn());
     this.parts.restored();
@@ -73,6 +73,7 @@ export class Memory {
       camera: camera.isPlaced && !camera.isWhole ? camera.stand : null, isParallel: camera.parallel,
       isSkeletonShown: isOn("skeleton"), isCompared: isOn("compare"),
       chosenView: this.store.state.chosenView, draft: draftToKeep(this.store.state),
+      dismissed: this.store.state.orders.flatMap(({ id, dismissed }) => (dismissed === true && id.length <= LONGEST_ORDER ? [id] : [])),
     });
   }
 }

@@ -62,7 +62,7 @@ export type Action =
   /** The browser has taken away what draws the picture, or given it back. */
   | { type: "picture lost"; isLost: boolean }
   /** The page was loaded again: what it showed, and what stood in the form. */
-  | { type: "remembered"; chosenView: string | null; draft: KeptDraft | null }
+  | { type: "remembered"; chosenView: string | null; draft: KeptDraft | null; dismissed: readonly string[] }
   // The form. `step` names the field or gesture: all that it does is one step to take back.
   | { type: "form read"; key: string; body: Values; settings: Values; problems: readonly Problem[]; step: string }
   | { type: "action chosen"; key: string }

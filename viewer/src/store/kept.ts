@@ -1,7 +1,7 @@
 /**
  * What the page keeps over a reload: the theme, whether the tour was seen, the person's name; and for each run of a relay by itself how views
  * look, and the dock. Of the run itself only pins, what monitors have said, whether this page has had the worst cells shown, how the page
- * stands and what stands in its form, no longer than the session; no secret.
+ * stands, what stands in its form and which refusals were dismissed, no longer than the session; no secret.
  */
 import type { Theme } from "../picture/theme";
 import type { Vector } from "../connection/protocol";
@@ -13,6 +13,7 @@ import { readDraft } from "./kept-draft";
 import type { KeptDraft } from "./kept-draft";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
+import { ORDERS } from "./orders";
 
 const KEY = "tombolo-page";
 /** Longer than anything that the page writes for longer than its session. */
@@ -77,7 +78,7 @@ export class Kept {
 
 /**
  * What is kept of a run: the pins, what monitors have said, null for nothing, and whether the pipeline of the worst cells is of this page;
- * how the page stood, and what stood in its form.
+ * how the page stood, what stood in its form, and which orders were taken off the list of what was refused.
  */
 export interface KeptOfRun {
   pins: readonly KeptPin[]; history: string | null; isWorstOwn: boolean;
@@ -86,10 +87,13 @@ export interface KeptOfRun {
   isParallel: boolean; isSkeletonShown: boolean; isCompared: boolean;
   chosenView: string | null;
   draft: KeptDraft | null;
+  dismissed: readonly string[];
 }
 
 /** The most characters of what monitors have said. */
 export const LONGEST_HISTORY = 300_000;
+/** The most characters of the id of an order that was dismissed: programs give ids too. */
+export const LONGEST_ORDER = 200;
 
 /**
  * What this page keeps of one run while it is loaded again, and no longer. It is for the storage of the session, which is that of one page.
@@ -113,12 +117,13 @@ export class KeptRun {
 
   read(): KeptOfRun {
     // A text in a text is longer than it is: its quotes are escaped.
-    const { pins, history, isWorstOwn, camera, isParallel, isSkeletonShown, isCompared, chosenView, draft } = read(this.storage, this.key, 2 * LONGEST_HISTORY + 2 * LONGEST);
+    const { pins, history, isWorstOwn, camera, isParallel, isSkeletonShown, isCompared, chosenView, draft, dismissed } = read(this.storage, this.key, 2 * (LONGEST_HISTORY + LONGEST + ORDERS * LONGEST_ORDER));
     return {
       pins: Array.isArray(pins) ? pins.filter(isPin).slice(0, PINS) : [], history: typeof history === "string" ? history : null,
       isWorstOwn: isWorstOwn === true, camera: isStand(camera) ? camera : null, isParallel: isParallel === true,
       isSkeletonShown: isSkeletonShown === true, isCompared: isCompared === true,
       chosenView: typeof chosenView === "string" ? chosenView : null, draft: readDraft(draft),
+      dismissed: Array.isArray(dismissed) ? dismissed.filter((id) => typeof id === "string" && id.length <= LONGEST_ORDER).slice(-ORDERS) : [],
     };
   }
 

@@ -4,11 +4,12 @@ import { describeOrder } from "../form/describe";
 import type { OrderRecord, State } from "./state";
 import { derived } from "./store";
 
-const LONGEST_LIST = 200;
+/** The most orders that are known of. */
+export const ORDERS = 200;
 
 function put(orders: readonly OrderRecord[], record: OrderRecord): readonly OrderRecord[] {
   const known = orders.some((other) => other.id === record.id);
-  return (known ? orders.map((other) => (other.id === record.id ? record : other)) : [...orders, record]).slice(-LONGEST_LIST);
+  return (known ? orders.map((other) => (other.id === record.id ? record : other)) : [...orders, record]).slice(-ORDERS);
 }
 
 /** An order of this viewer's own, just sent. */
@@ -44,6 +45,11 @@ export interface Withdrawal { how: "cancelled" | "replaced"; by: string | null }
 export function withdrawalOf({ status, reason }: OrderRecord): Withdrawal | null {
   const [, how, by] = (status === "rejected" ? /^(cancelled|replaced)(?: by order .+?)?(?: by (c\d+))?$/.exec(reason ?? "") : null) ?? [];
   return how === "cancelled" || how === "replaced" ? { how, by: by ?? null } : null;
+}
+
+/** Takes orders off the list of what was refused. */
+export function ordersDismissed(orders: readonly OrderRecord[], ids: readonly string[]): readonly OrderRecord[] {
+  return orders.some(({ id }) => ids.includes(id)) ? orders.map((order) => (ids.includes(order.id) ? { ...order, dismissed: true } : order)) : orders;
 }
 
 /** Whether the shape is on its way to another: an order is being computed or carried out. */

@@ -8,7 +8,7 @@ import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { asFormOrder } from "./edits";
 import { canTakeUp, draftOf, saysSomething, whyNotFitting } from "./kept-draft";
-import { orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
+import { ordersDismissed, orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { pipelinesAfter } from "./pipeline-drafts";
 import { NO_FORECAST } from "./state";
@@ -60,7 +60,7 @@ function after(state: State, action: Action): State {
       const isOurs = state.orders.some((order) => order.id === action.status.id);
       return { ...state, orders: orderTold(state.orders, action.status), undone: isOurs ? state.undone : [] };
     }
-    case "order dismissed": return { ...state, orders: state.orders.map((order) => (order.id === action.id ? { ...order, dismissed: true } : order)) };
+    case "order dismissed": return { ...state, orders: ordersDismissed(state.orders, [action.id]) };
     case "played": return { ...state, played: action.played };
     case "end": return { ...state, ...NOBODY, end: action.end, askedBy: null };
     case "wheel asked": return { ...state, askedBy: action.by };
@@ -91,7 +91,7 @@ function after(state: State, action: Action): State {
     }
     case "remembered": {
       const isThere = state.hello?.views.some(({ name }) => name === action.chosenView);
-      return { ...state, keptDraft: action.draft, chosenView: isThere ? action.chosenView : state.chosenView };
+      return { ...state, keptDraft: action.draft, orders: ordersDismissed(state.orders, action.dismissed), chosenView: isThere ? action.chosenView : state.chosenView };
     }
     case "view chosen": return { ...state, chosenView: action.view };
     case "part": {

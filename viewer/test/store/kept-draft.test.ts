@@ -26,7 +26,7 @@ function kept(): { draft: KeptDraft; order: Json } {
 function again(draft: KeptDraft, hello: Partial<typeof HELLO> = {}): State {
   const connected = reduce(INITIAL, { type: "connection", state: "connected", explanation: "" });
   const greeted = reduce(connected, { type: "hello", hello: { ...HELLO, views: [{ name: "surface", kind: "surface" }, { name: "cut", kind: "slice" }], isAwaitingEdits: true, ...hello } });
-  return reduce(greeted, { type: "remembered", chosenView: "cut", draft });
+  return reduce(greeted, { type: "remembered", chosenView: "cut", draft, dismissed: [] });
 }
 
 describe("what stands in the form", () => {

@@ -16,12 +16,12 @@ describe("what is kept of a run over a reload", () => {
     key: "translate", body: { by: [1, 0, 0] }, settings: {}, remedy: {}, updating: 1, amount: { whole: { by: [2, 0, 0] }, fraction: 0.5 },
     before: { translate: {} }, parts: { wall: "handle", inlet: "fixed" },
   };
-  const NOTHING: KeptOfRun = { pins: [], history: null, isWorstOwn: false, camera: null, isParallel: false, isSkeletonShown: false, isCompared: false, chosenView: null, draft: null };
+  const NOTHING: KeptOfRun = { pins: [], history: null, isWorstOwn: false, camera: null, isParallel: false, isSkeletonShown: false, isCompared: false, chosenView: null, draft: null, dismissed: [] };
   beforeEach(() => { stored = new Map(); });
 
-  it("is its pins, what its monitors have said and whose the worst cells are, how the page stood and what stood in its form, by its path", () => {
+  it("is its pins, what its monitors have said and whose the worst cells are, how the page stood, what stood in its form and what was dismissed, by its path", () => {
     const whole: KeptOfRun = {
-      pins: [PIN], history: '"'.repeat(LONGEST_HISTORY - 1), isWorstOwn: true, camera: CAMERA, isParallel: true, isSkeletonShown: true, isCompared: true, chosenView: "cut", draft: DRAFT,
+      pins: [PIN], history: '"'.repeat(LONGEST_HISTORY - 1), isWorstOwn: true, camera: CAMERA, isParallel: true, isSkeletonShown: true, isCompared: true, chosenView: "cut", draft: DRAFT, dismissed: ["o1", "o2"],
     };
     new KeptRun(storage, "/a/").keep(whole);
     expect(new KeptRun(storage, "/a/").read()).toEqual(whole);
@@ -34,13 +34,15 @@ describe("what is kept of a run over a reload", () => {
     const page = new KeptRun(storage, "/");
     page.keep({ ...NOTHING, pins: [PIN] });
     const [key] = stored.keys();
-    for (const text of ["{", "[]", "3", '{"pins": {}, "history": 1, "isWorstOwn": 1, "camera": [], "isParallel": 1, "isSkeletonShown": "x", "isCompared": {}, "chosenView": 3, "draft": 4}']) {
+    for (const text of ["{", "[]", "3", '{"pins": {}, "history": 1, "isWorstOwn": 1, "camera": [], "isParallel": 1, "isSkeletonShown": "x", "isCompared": {}, "chosenView": 3, "draft": 4, "dismissed": "o1"}']) {
       stored.set(key!, text);
       expect(page.read()).toEqual(NOTHING);
     }
     const wrong = [null, 3, { ...PIN, point: [1, 2] }, { ...PIN, point: [1, 2, "3"] }, { ...PIN, view: 1 }, { ...PIN, name: "<b>" }];
     stored.set(key!, JSON.stringify({ pins: [...wrong, ...Array.from({ length: 20 }, () => PIN)] }));
     expect(page.read().pins).toEqual(Array.from({ length: 8 }, () => PIN));
+    stored.set(key!, JSON.stringify({ dismissed: [3, null, "x".repeat(201), ...Array.from({ length: 201 }, (_, i) => `o${i}`)] }));
+    expect(page.read().dismissed).toEqual(Array.from({ length: 200 }, (_, i) => `o${i + 1}`));
     for (const camera of [{}, { ...CAMERA, position: [1, 2] }, { ...CAMERA, position: [0, 0, 0] }, { ...CAMERA, viewAngle: 0 }, { ...CAMERA, middle: [1] }, { ...CAMERA, parallel: 1 }]) {
       stored.set(key!, JSON.stringify({ camera }));
       expect(page.read().camera, JSON.stringify(camera)).toBeNull();
