@@ -60,8 +60,11 @@ const steps = [
     await page.selectOption("#speed", "0.25");
     await page.click("#play");
     await button("Pause");
+    const told = (state) => viewer.holds(`"recording (${state})"`, (words) => document.getElementById("run").textContent === words, `recording (${state})`);
+    await told("playing");
     await page.click("#play");
     await button("Play");
+    await told("paused");
   }],
   ["the slider, dragged, shows another cycle with the shape that it had", async () => {
     await drag(0.8, 0.25);

@@ -51,7 +51,7 @@ export class StatusBar {
     const run = part("run");
     const now = runState(state);
     run.dataset.state = now;
-    write(run, end ? `ended: ${ENDS[end.how]}` : now);
+    write(run, runText(state));
     run.title = now === "unknown" && status ? "There is no connection: nobody here can say how the run stands." : "";
     write(part("channel"), hello?.channel ?? "");
 
@@ -89,14 +89,23 @@ export class StatusBar {
 
   private silence(): void {
     const { state } = this.store;
-    const { connection, status, end } = state;
+    const { connection, status, end, hello } = state;
     const quiet = performance.now() - this.heard;
-    const still = status?.stopped === true || status?.paused === true || end !== null;
+    // No simulation speaks in a recording.
+    const still = status?.stopped === true || status?.paused === true || end !== null || Boolean(hello?.recording);
     const isSilent = connection.state === "connected" && !still && quiet >= Math.max(SILENCE, 10000 * (status?.step_seconds ?? 0));
     const words = isSilent ? `The simulation has not said a word for ${Math.round(quiet / 1000)} s. The picture may be old.` : slowLink(state, performance.now());
     part("silence").hidden = words === "";
     write(part("silence"), words);
   }
+}
+
+/** How the run stands, or whether a recording of it goes on. */
+function runText(state: State): string {
+  const now = runState(state);
+  if (state.end) return `ended: ${ENDS[state.end.how]}`;
+  if (!state.hello?.recording || now === "unknown") return now;
+  return `recording (${now === "running" ? "playing" : "paused"})`;
 }
 
 /** What is amiss with the connection or over with the run, and what can be done. */

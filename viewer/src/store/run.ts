@@ -4,8 +4,10 @@ import type { State } from "./state";
 /** How the run stands, as far as is known: after a bare loss of the connection nobody can say. */
 export type RunState = "unknown" | "running" | "paused" | "stopping" | "ended";
 
-export function runState({ connection, status, end }: State): RunState {
+export function runState({ connection, status, end, hello, played }: State): RunState {
   if (end) return "ended";
+  // A status of a recording is of the run that was recorded.
+  if (connection.state === "connected" && hello?.recording && played) return played.paused || played.at_end ? "paused" : "running";
   if (connection.state !== "connected" || !status) return "unknown";
   return status.stopped ? "stopping" : status.paused ? "paused" : "running";
 }

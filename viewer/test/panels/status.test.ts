@@ -35,6 +35,34 @@ describe("the bar", () => {
     expect(at("silence").hidden).toBe(true);
   });
 
+  it("says that a recording is one, and whether it goes on", () => {
+    const moment = { seconds: 0, cycle: 3, time: 0.5 };
+    made.greet({ recording: { first: moment, last: moment } });
+    const told = (paused: boolean, at_end: boolean): (string | null | undefined)[] => {
+      made.store.dispatch({ type: "played", played: { ...moment, speed: 1, paused, at_end } });
+      return [at("run").textContent, at("run").dataset.state];
+    };
+    expect(told(false, false)).toEqual(["recording (playing)", "running"]);
+    expect(told(true, false)).toEqual(["recording (paused)", "paused"]);
+    expect(told(false, true)).toEqual(["recording (paused)", "paused"]);
+    made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "" });
+    expect(at("run").textContent).toBe("unknown");
+  });
+
+  it("does not call a recording that rests a simulation without a word", () => {
+    vi.useFakeTimers();
+    try {
+      const { store, commands, greet } = page();
+      const moment = { seconds: 0, cycle: 3, time: 0.5 };
+      greet({ recording: { first: moment, last: moment } });
+      new StatusBar(store, commands);
+      vi.advanceTimersByTime(20_000);
+      expect(at("silence").hidden).toBe(true);
+    } finally {
+      vi.useRealTimers();
+    }
+  });
+
   it("does not claim that a run goes on when the connection is lost", () => {
     made.store.dispatch({ type: "connection", state: "reconnecting", explanation: "The connection was lost." });
     expect(at("run").textContent).toBe("unknown");
