@@ -15,10 +15,6 @@ const { page } = anna;
 let carl = null;
 const names = (viewer) => viewer.page.evaluate(() => window.tombolo.pipelines.map(({ name }) => name));
 const text = () => page.evaluate(() => [...document.querySelectorAll("#pipeline-text .cm-line")].map((line) => line.textContent).join("\n"));
-const clean = async (viewer, state) => {
-  const found = await viewer.violations();
-  check(found.length === 0, `${viewer.name}, ${state}: axe finds ${found.join("; ")}`);
-};
 const checked = (state) => anna.holds(`"${state}" below the text`, (said) => document.getElementById("pipeline-state").textContent === said, state);
 const options = () => page.locator(".cm-tooltip-autocomplete li").evaluateAll((found) => found.map((one) => one.querySelector(".cm-completionLabel").textContent));
 /** Takes the first of what the completion offers, which begins with a text. */
@@ -72,7 +68,7 @@ const steps = [
     check(!(await page.evaluate(() => performance.getEntriesByType("resource").some(({ name }) => /editor|language/.test(name)))), "the editor is loaded before anybody wants it");
     await page.locator("#pipelines-panel").scrollIntoViewIfNeeded();
     await anna.picture("list");
-    await clean(anna, "list");
+    await anna.clean("list");
   }],
   ["a slice is added from a template, with completion from the schema", async () => {
     await page.click("#pipeline-add");
@@ -108,7 +104,7 @@ const steps = [
     await page.keyboard.press("End");
     await page.keyboard.type(",");
     await checked("No errors.");
-    await clean(anna, "editor");
+    await anna.clean("editor");
     await page.keyboard.press("Control+Enter");
     await outcome("applied at cycle");
     await anna.until("the view", ({ views }) => views.slice?.triangles > 0);
@@ -128,7 +124,7 @@ const steps = [
     await page.keyboard.press("Control+Enter");
     check(!(await anna.text("#pipeline-outcome")).includes("sent"), "it was sent all the same");
     await anna.picture("misspelt");
-    await clean(anna, "with an error");
+    await anna.clean("with an error");
     await page.click('#pipeline-errors [data-act="fix"]');
     await checked("No errors.");
     check((await text()).includes('"normal"'), `the text is ${await text()}`);
@@ -143,7 +139,7 @@ const steps = [
     await page.keyboard.press("F8");
     await anna.holds("the warning at the cursor", () => /neither the run/.test(document.querySelector(".cm-panel-lint, .cm-tooltip-lint, .cm-diagnostic-warning")?.textContent ?? ""));
     await anna.picture("warned");
-    await clean(anna, "with a warning");
+    await anna.clean("with a warning");
     await page.keyboard.press("Control+Enter");
     await outcome("The run refused it:");
     await anna.holds("the mark", () => document.querySelector(".cm-lintRange-error")?.textContent === '"pressur"');
@@ -210,7 +206,7 @@ const steps = [
     await page.click("#theme");
     await page.click('#pipelines li[data-pipeline="health"] .load');
     await checked("No errors.");
-    await clean(anna, "light");
+    await anna.clean("light");
     await anna.picture("light");
     await page.keyboard.press("Escape");
   }],
@@ -236,7 +232,7 @@ const steps = [
     check(await carl.text("#pipeline-text .cm-content") === before, "a watcher may write");
     check(await carl.page.isDisabled("#pipeline-apply"), "a watcher may apply");
     await carl.picture("watching");
-    await clean(carl, "watching");
+    await carl.clean("watching");
   }],
   ["a view is seen whose first frame comes before the view is listed", async () => {
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="duplicate"]');
@@ -250,7 +246,7 @@ const steps = [
   ["a pipeline is removed once that is confirmed", async () => {
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
     await anna.picture("question");
-    await clean(anna, "question");
+    await anna.clean("question");
     await page.click('#pipelines li[data-pipeline="slice"] [data-act="remove"]');
     await outcome("slice is removed at cycle");
     await anna.holds("a list without it", () => !window.tombolo.pipelines.some(({ name }) => name === "slice"));

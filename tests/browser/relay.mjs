@@ -23,10 +23,6 @@ const lister = await Viewer.open(browser, "list", options);
 const viewer = await Viewer.open(browser, "viewer", options);
 const { page } = viewer;
 const names = () => lister.page.locator("td:first-child").allInnerTexts();
-const clean = async (who, what) => {
-  const found = await who.violations();
-  check(found.length === 0, `${what}: ${found.join("; ")}`);
-};
 const pinch = async (factor) => {
   await page.selectOption("#action", "scale_direction");
   await page.check('input[aria-label="throat: handle"]');
@@ -43,7 +39,7 @@ const steps = [
     // A run may have come since the page was made, which looks again every few seconds.
     await lister.holds("its three runs", () => [...document.querySelectorAll("td:first-child")].map((it) => it.innerText).join() === "nozzle,pump,wing");
     check(!lister.page.url().includes("token"), `the secret stays in ${lister.page.url()}`);
-    await clean(lister, "the list");
+    await lister.clean("the list");
     await lister.picture("runs");
   }],
   ["a run is steered through the relay: an order, and undo", async () => {
