@@ -13,7 +13,7 @@ import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { boxRegionOf, combined, grown, meantBy, neighboursOf, pointsOf, regionOf } from "./face-choice";
 import type { Mode } from "./face-choice";
-import { contains, distance } from "./gizmo";
+import { contains, distance, reachOf } from "./gizmo";
 import { boxOf } from "./handle-box";
 import type { ShapeRegion } from "./shape-target";
 import { svg } from "./overlay";
@@ -33,13 +33,16 @@ export interface FacePicture {
   setChosenFaces(points: Float32Array, corners: Uint32Array): void;
 }
 
-interface Stroke { pointer: number; mode: Mode; path: Place[]; faces: Set<number>; before: ReadonlySet<number>; seen: VisibleFaces }
+/** `down` is the event that began it. */
+interface Stroke { down: PointerEvent; mode: Mode; path: Place[]; faces: Set<number>; before: ReadonlySet<number>; seen: VisibleFaces }
 
 let strokes = 0;
 
 export class FaceTools implements ShapeRegion {
   private tool: Tool | null = null;
   private stroke: Stroke | null = null;
+  /** The finger whose stroke was given up for the camera, while it is down. */
+  private handedOver: number | null = null;
   private surface: ShownPoints | null = null;
   private neighbours: Int32Array | null = null;
   private meant: { region: Json; faces: ReadonlySet<number>; points: ReadonlySet<number> } | null = null;
@@ -144,15 +147,34 @@ export class FaceTools implements ShapeRegion {
   private down(event: PointerEvent): void {
     if (!this.tool || !this.scene.contains(event.target as Node)) return;
     // The other buttons are the camera's.
-    if (event.button !== 0) return;
+    if (event.button !== 0 || event.pointerId === this.handedOver) return;
+    // A finger beside another one is the camera's, as the first is.
+    if (event.pointerType === "touch" && !event.isPrimary && (!this.stroke || this.handOver(this.stroke))) return;
     event.stopImmediatePropagation();
     event.preventDefault();
     if (this.stroke || !this.surface) return;
     this.stage.setPointerCapture(event.pointerId);
     const mode = event.altKey ? "take" : event.shiftKey ? "add" : this.mode.value as Mode;
     const seen = this.visible(this.surface, this.picture.projection());
-    this.stroke = { pointer: event.pointerId, mode, path: [this.placeOf(event)], faces: new Set(), before: this.meant?.faces ?? new Set(), seen };
+    this.stroke = { down: event, mode, path: [this.placeOf(event)], faces: new Set(), before: this.meant?.faces ?? new Set(), seen };
     this.extend(this.placeOf(event));
+  }
+
+  /** A second finger has come: as long as the first has not gone far, both are meant for the camera, which has not seen the first. */
+  private handOver({ down, path }: Stroke): boolean {
+    const isFar = path.some((place) => distance(place, path[0]!) > reachOf(down.pointerType));
+    if (down.pointerType !== "touch" || isFar) return false;
+    this.giveUp();
+    this.handedOver = down.pointerId;
+    down.target?.dispatchEvent(new PointerEvent(down.type, down));
+    return true;
+  }
+
+  /** A stroke comes to nothing. */
+  private giveUp(): void {
+    this.stroke = null;
+    this.draw();
+    this.paint(this.meant?.faces ?? new Set());
   }
 
   private move(event: PointerEvent): void {
@@ -162,17 +184,18 @@ export class FaceTools implements ShapeRegion {
       return;
     }
     event.stopImmediatePropagation();
-    if (event.pointerId === this.stroke.pointer) this.extend(this.placeOf(event));
+    if (event.pointerId === this.stroke.down.pointerId) this.extend(this.placeOf(event));
   }
 
   private up(event: PointerEvent): void {
     const { stroke } = this;
-    if (!stroke || event.pointerId !== stroke.pointer) return;
+    if (event.pointerId === this.handedOver) this.handedOver = null;
+    if (!stroke || event.pointerId !== stroke.down.pointerId) return;
     event.stopImmediatePropagation();
+    if (event.type !== "pointerup") return this.giveUp();
     this.stroke = null;
     this.draw();
-    if (event.type === "pointerup") this.take(stroke);
-    else this.paint(this.meant?.faces ?? new Set());
+    this.take(stroke);
   }
 
   private key(event: KeyboardEvent): void {
@@ -181,11 +204,8 @@ export class FaceTools implements ShapeRegion {
     const field = textField(event.target);
     if (field && !this.stroke && !this.bar.contains(field)) return;
     event.stopPropagation();
-    if (this.stroke) {
-      this.stroke = null;
-      this.draw();
-      this.paint(this.meant?.faces ?? new Set());
-    } else this.show(false);
+    if (this.stroke) this.giveUp();
+    else this.show(false);
   }
 
   private extend(place: Place): void {

@@ -177,6 +177,46 @@ describe("choosing faces", () => {
     expect([outline(), region()]).toEqual(["", undefined]);
   });
 
+  describe("by fingers", () => {
+    const finger = (kind: string, at: Place, pointerId: number): void => send(kind, at, { pointerId, pointerType: "touch", isPrimary: pointerId === 1 });
+    const [from, above, to] = around(40) as [Place, Place, Place];
+    const beside: Place = [from[0] + 9, from[1]];
+    let heard: string[];
+    beforeEach(() => {
+      heard = [];
+      for (const kind of ["pointerdown", "pointermove", "pointerup"]) scene.addEventListener(kind, (event) => heard.push(`${kind.slice(7)} ${(event as PointerEvent).pointerId}`));
+      document.getElementById("faces")!.click();
+      button("Brush").click();
+    });
+
+    it("leaves both to the camera where a second comes before the first has gone far, and chooses nothing", () => {
+      finger("pointerdown", from, 1);
+      finger("pointermove", beside, 1);
+      expect([painted > 0, heard]).toEqual([true, []]);
+      finger("pointerdown", above, 2);
+      finger("pointermove", to, 1);
+      finger("pointermove", middle, 2);
+      finger("pointerdown", middle, 3);
+      finger("pointerup", to, 1);
+      finger("pointerup", middle, 2);
+      expect(heard).toEqual(["down 1", "down 2", "move 1", "move 2", "down 3", "up 1", "up 2"]);
+      expect([painted, outline(), region()]).toEqual([0, "", undefined]);
+      // The next one draws again.
+      finger("pointerdown", from, 1);
+      finger("pointerup", from, 1);
+      expect([heard.length, faces().length > 0]).toEqual([7, true]);
+    });
+
+    it("keeps a stroke that has gone far from a second", () => {
+      finger("pointerdown", from, 1);
+      finger("pointermove", to, 1);
+      finger("pointerdown", above, 2);
+      finger("pointermove", middle, 2);
+      finger("pointerup", to, 1);
+      expect([heard, faces().length > 0]).toEqual([[], true]);
+    });
+  });
+
   it("looks at all triangles once for each shape and each place to look from, however often one presses", () => {
     made.store.dispatch({ type: "composed", key: "translate", values: { region: { faces: [...sides.keys()].filter((face) => sides[face] === 4) } }, step: "a" });
     const looked = vi.spyOn(OBLIQUE, "toPicture");
