@@ -9,6 +9,9 @@ const FINEST = 1e-3;
 const CLOSER = 0.5;
 /** So many steps are one with shift. */
 const LEAP = 10;
+/** How near to the line of the cursor a finger means it, and how far one slips that taps; in pixels. */
+const REACH = 10;
+const SLIP = 8;
 
 export interface Controlled {
   /** Shows so many times as much around the cursor. */
@@ -16,8 +19,8 @@ export interface Controlled {
   whole(): void;
   /** Moves the cursor by so many values; infinitely many are the first or the last. */
   step(by: number): void;
-  /** Whether keys or a finger have put the cursor anywhere. */
-  hasCursor(): boolean;
+  /** Where keys or a finger have put the cursor, from 0 to 1 across the plot where that is seen; null where they have not. */
+  cursor(): number | null;
   /** Takes that cursor away. */
   release(): void;
   /** Puts the cursor at a place, of 0 to 1 across the plot. */
@@ -58,8 +61,18 @@ export function containing([low, high]: Span, at: number): Span {
   return [low + by, high + by];
 }
 
-/** Takes the keys of `root`, and the fingers on it; `area` is where in the page the plot itself lies. */
-export function watchPlot(root: HTMLElement, area: () => { left: number; width: number } | null, plot: Controlled): void {
+/** Where in the page a plot itself lies, without its axes. */
+export type Area = Pick<DOMRect, "left" | "top" | "width" | "height">;
+
+/** Whether a tap there takes the cursor away: it is on the cursor's line, or beside the plot. */
+function isAway({ left, top, width, height }: Area, cursor: number | null, { clientX, clientY }: PointerEvent): boolean {
+  if (cursor === null) return false;
+  const isInside = clientX >= left && clientX <= left + width && clientY >= top && clientY <= top + height;
+  return !isInside || Math.abs(clientX - left - cursor * width) <= REACH;
+}
+
+/** Takes the keys of `root`, and the fingers on it. */
+export function watchPlot(root: HTMLElement, area: () => Area | null, plot: Controlled): void {
   root.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const steps = event.shiftKey ? LEAP : 1;
@@ -68,7 +81,7 @@ export function watchPlot(root: HTMLElement, area: () => { left: number; width: 
       ArrowLeft: () => plot.step(-steps), ArrowRight: () => plot.step(steps), ArrowDown: () => plot.step(-steps), ArrowUp: () => plot.step(steps), Home: () => plot.step(-Infinity), End: () => plot.step(Infinity),
     };
     // Where there is no cursor to be taken away, the key is meant for something else.
-    if (event.key === "Escape" && plot.hasCursor()) actions.Escape = () => plot.release();
+    if (event.key === "Escape" && plot.cursor() !== null) actions.Escape = () => plot.release();
     const action = actions[event.key];
     if (!action) return;
     event.preventDefault();
@@ -79,6 +92,8 @@ export function watchPlot(root: HTMLElement, area: () => { left: number; width: 
   /** Where each finger is, and where the first two were when the second came. */
   const fingers = new Map<number, number>();
   let from: Span | null = null;
+  /** The finger that takes the cursor away if it goes no further, and where it came down. */
+  let away: PointerEvent | null = null;
   const place = ({ clientX }: PointerEvent): number | null => {
     const found = area();
     return found && found.width > 0 ? (clientX - found.left) / found.width : null;
@@ -91,7 +106,8 @@ export function watchPlot(root: HTMLElement, area: () => { left: number; width: 
     event.preventDefault();
     root.focus({ preventScroll: true });
     fingers.set(event.pointerId, at);
-    if (fingers.size === 1) plot.point(at);
+    away = fingers.size === 1 && isAway(area()!, plot.cursor(), event) ? event : null;
+    if (fingers.size === 1 && !away) plot.point(at);
     if (fingers.size !== 2) return;
     from = both();
     plot.pinchBegun();
@@ -100,11 +116,15 @@ export function watchPlot(root: HTMLElement, area: () => { left: number; width: 
     const at = fingers.has(event.pointerId) ? place(event) : null;
     if (at === null) return;
     fingers.set(event.pointerId, at);
+    if (away && Math.hypot(event.clientX - away.clientX, event.clientY - away.clientY) <= SLIP) return;
+    away = null;
     if (from && fingers.size > 1) plot.pinch(from, both());
     // A finger that stays after a pinch means nothing.
     else if (!from) plot.point(at);
   });
   for (const kind of ["pointerup", "pointercancel"] as const) root.addEventListener(kind, (event) => {
-    if (fingers.delete(event.pointerId) && fingers.size === 0) from = null;
+    if (!fingers.delete(event.pointerId) || fingers.size > 0) return;
+    if (away && kind === "pointerup") plot.release();
+    from = away = null;
   });
 }

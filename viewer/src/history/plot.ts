@@ -75,7 +75,7 @@ export class HistoryPlot implements Tab {
     this.canvas.addEventListener("mousemove", () => { this.held = null; }, true);
     watchPlot(this.canvas, () => this.canvas.querySelector(".u-over")?.getBoundingClientRect() ?? null, {
       zoomBy: (factor) => this.zoomBy(factor), whole: () => this.zoomTo(null), step: (by) => this.step(by),
-      hasCursor: () => this.held !== null, release: () => this.release(),
+      cursor: () => this.heldPlace, release: () => this.release(),
       point: (at) => {
         const along = this.shown[0] + at * (this.shown[1] - this.shown[0]);
         this.hold(this.isOverTime ? valueAt(this.times, this.cycles, along) : along);
@@ -319,11 +319,16 @@ export class HistoryPlot implements Tab {
     // The nearest of those that are kept.
     const [before, behind] = [this.cycles[after - 1] ?? -Infinity, this.cycles[after] ?? Infinity];
     this.row = this.cycles.length === 0 ? null : this.held - before <= behind - this.held ? after - 1 : after;
-    const { plot, row } = this;
-    if (!plot || row === null) return;
+    const { plot, heldPlace } = this;
+    if (plot && heldPlace !== null) plot.setCursor({ left: heldPlace * plot.over.clientWidth, top: plot.over.clientHeight / 2 }, false);
+  }
+
+  /** Where the cursor was put, from 0 to 1 across what is shown; null where it was not. */
+  private get heldPlace(): number | null {
+    if (this.held === null || this.row === null) return null;
     // The plot takes another part of its axis at the end of the task: until then it knows only the old places.
     const [low, high] = this.shown;
-    plot.setCursor({ left: ((this.along[row]! - low) / (high - low)) * plot.over.clientWidth, top: plot.over.clientHeight / 2 }, false);
+    return (this.along[this.row]! - low) / (high - low);
   }
 
   private drawMarks(plot: uPlot): void {

@@ -25,14 +25,14 @@ describe("the part of an axis that is shown", () => {
 describe("keys and fingers on a plot", () => {
   let asked: unknown[];
   let root: HTMLElement;
-  let hasCursor: boolean;
-  const send = (kind: string, pointerId: number, x: number, pointerType = "touch"): boolean =>
-    root.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType, clientX: x }));
+  let cursor: number | null;
+  const send = (kind: string, pointerId: number, x: number, pointerType = "touch", y = 30): boolean =>
+    root.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType, clientX: x, clientY: y }));
   beforeEach(() => {
-    [asked, hasCursor] = [[], false];
+    [asked, cursor] = [[], null];
     root = document.createElement("div");
-    watchPlot(root, () => ({ left: 100, width: 200 }), {
-      zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), hasCursor: () => hasCursor, release: () => asked.push("release"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
+    watchPlot(root, () => ({ left: 100, top: 10, width: 200, height: 50 }), {
+      zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), cursor: () => cursor, release: () => asked.push("release"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
       pinchBegun: () => asked.push("begun"), pinch: (from, to) => asked.push(["pinch", from, to]),
     });
   });
@@ -44,7 +44,7 @@ describe("keys and fingers on a plot", () => {
     press("ArrowLeft", { shiftKey: true });
     expect(asked.at(-1)).toBe(-10);
     for (const [key, more] of [["x", {}], ["Tab", {}], ["0", { ctrlKey: true }], ["Escape", {}]] as const) expect(press(key, more), key).toBe(true);
-    hasCursor = true;
+    cursor = 0.5;
     expect([press("Escape"), asked.at(-1), asked.length]).toEqual([false, "release", 12]);
   });
 
@@ -55,6 +55,30 @@ describe("keys and fingers on a plot", () => {
     expect(asked).toEqual([["point", 0.25]]);
     expect(send("pointerdown", 2, 150, "mouse")).toBe(true);
     expect(asked.length).toBe(1);
+  });
+
+  it("take the cursor away by a tap on its line or beside the plot, and by nothing else", () => {
+    const tap = (x: number, y = 30, slip = 0): unknown[] => {
+      asked.length = 0;
+      send("pointerdown", 1, x, "touch", y);
+      if (slip > 0) send("pointermove", 1, x + slip, "touch", y);
+      send("pointerup", 1, x + slip, "touch", y);
+      return [...asked];
+    };
+    // Without a cursor each puts one.
+    expect([tap(200), tap(90)]).toEqual([[["point", 0.5]], [["point", -0.05]]]);
+    cursor = 0.5;
+    expect([tap(205), tap(196, 30, 5), tap(90), tap(310), tap(150, 70), tap(150, 5)]).toEqual(Array.from({ length: 6 }, () => ["release"]));
+    // A drag of its line, and a tap elsewhere, move it.
+    expect([tap(200, 30, 50), tap(150)]).toEqual([[["point", 0.75]], [["point", 0.25]]]);
+    asked.length = 0;
+    send("pointerdown", 1, 200);
+    send("pointercancel", 1, 200);
+    send("pointerdown", 1, 200);
+    send("pointerdown", 2, 250);
+    send("pointerup", 1, 200);
+    send("pointerup", 2, 250);
+    expect(asked).toEqual(["begun"]);
   });
 
   it("zoom by a pinch, after which the one that stays longer moves nothing", () => {

@@ -241,16 +241,19 @@ describe("the plots below the picture", () => {
       expect(key("x")).toBe(true);
     });
 
-    it("a tap puts the cursor at the nearest value, and a pinch zooms", () => {
+    it("a tap puts the cursor at the nearest value, another on its line takes it away, and a pinch zooms", () => {
       open((cycle) => cycle / 1000);
       const area = document.createElement("div");
       area.className = "u-over";
-      area.getBoundingClientRect = () => ({ left: 0, width: 400 }) as DOMRect;
+      area.getBoundingClientRect = () => ({ left: 0, top: 0, width: 400, height: 100 }) as DOMRect;
       canvas().append(area);
       const finger = (kind: string, pointerId: number, x: number): void => void area.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType: "touch", clientX: x }));
       finger("pointerdown", 1, 175);
       finger("pointerup", 1, 175);
       expect(heading()).toContain("cycle 40");
+      finger("pointerdown", 1, 160);
+      finger("pointerup", 1, 160);
+      expect([heading(), canvas().getAttribute("aria-valuetext")]).toEqual(["cycle 100 · before: Throat", "the newest values"]);
       finger("pointerdown", 1, 100);
       finger("pointerdown", 2, 300);
       finger("pointermove", 1, 0);
