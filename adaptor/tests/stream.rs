@@ -429,7 +429,7 @@ fn only_the_token_lets_anybody_in() {
     let page = get(&solver.adaptor, "/", "");
     assert!(page.starts_with("HTTP/1.1 200") && page.contains("text/html"), "{page}");
     let policy = "content-security-policy: default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; \
-        style-src 'self' 'unsafe-inline'; style-src-attr 'none'; img-src 'self' data: blob:; worker-src 'self'; \
+        style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; worker-src 'self'; \
         connect-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n";
     for header in ["no-cache", "nosniff", policy] {
         assert!(page.contains(header), "{header}: {page}");

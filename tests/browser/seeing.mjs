@@ -46,7 +46,7 @@ await page.addInitScript(() => {
 });
 
 /** What the page may do, and nothing else: no script of others, none in the page itself, no other host, no frame around it. */
-const POLICY = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; style-src-attr 'none'; img-src 'self' data: blob:; worker-src 'self'; "
+const POLICY = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; worker-src 'self'; "
   + "connect-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 const until = (what, condition, argument) => viewer.holds(what, condition, argument);

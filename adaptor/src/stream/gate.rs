@@ -29,9 +29,10 @@ const HEADERS: [(HeaderName, &str); 3] = [
 ];
 
 /// The content security policy of the viewer, up to the names of the pages that may show it in a frame.
-/// The editor of pipelines brings its styles as elements; nothing has them as attributes.
+/// Styles are let in: the editor of pipelines brings its own as elements, and browsers write them as
+/// attributes where somebody types in it.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; \
-    style-src-attr 'none'; img-src 'self' data: blob:; worker-src 'self'; connect-src 'self'; object-src 'none'; \
+    img-src 'self' data: blob:; worker-src 'self'; connect-src 'self'; object-src 'none'; \
     base-uri 'none'; form-action 'none'; frame-ancestors";
 
 /// The policy that allows nothing at all.
