@@ -62,6 +62,9 @@ export function isRedoable(state: State): boolean {
   return left !== undefined && !sameJson(left, state.hello?.stack);
 }
 
+/** What an order sets beside its edits. What else it says, such as until when it may wait, was of its own time. */
+const SETTINGS = ["schedule", "deform", "guard"] as const;
+
 /** An order as the form composes it: its edit, which edit of the stack that replaces, and what is set beside. */
 export interface FormOrder { edit: Json; updating: number | null; settings: Values }
 
@@ -71,7 +74,8 @@ export interface FormOrder { edit: Json; updating: number | null; settings: Valu
  */
 export function asFormOrder(order: Json | undefined, now: readonly Json[]): FormOrder | null {
   if (!isObject(order)) return null;
-  const { edits, stack, undo, ...settings } = order;
+  const { edits, stack, undo } = order;
+  const settings: Values = Object.fromEntries(SETTINGS.flatMap((name) => (order[name] === undefined ? [] : [[name, order[name]]])));
   if (undo !== undefined) return null;
   if (Array.isArray(edits) && stack === undefined) return edits.length === 1 ? { edit: edits[0]!, updating: null, settings } : null;
   if (!Array.isArray(stack)) return null;

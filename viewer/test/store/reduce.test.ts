@@ -115,6 +115,9 @@ describe("an order that was refused", () => {
       { undo: 1 }, { edits: [nudge(3), nudge(4)] }, { edits: [] }, { stack: now }, { stack: [] }, { stack: [pinch(0.5), nudge(2)] }, { stack: [pinch(0.5), nudge(2), nudge(1)] },
       { stack: [pinch(0.1), nudge(9), nudge(2)] }, { stack: [nudge(9), nudge(1), nudge(2)] }, { displacement: { file: "a" } }, null, 3,
     ];
+    // Which order it took the place of, and until when it might wait, was of its own time.
+    const settings = { schedule: { steps: 3 }, deform: { method: "surface" }, guard: { otherwise: "clamp" } };
+    expect(asFormOrder({ edits: [nudge(9)], ...settings, replaces: "o1", deadline: { cycle: 9 } }, now)?.settings).toEqual(settings);
     for (const order of others) expect(asFormOrder(order, now), JSON.stringify(order)).toBeNull();
     expect(asFormOrder(undefined, now)).toBeNull();
   });
