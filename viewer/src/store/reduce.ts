@@ -292,11 +292,11 @@ function withOrderTakenUp(state: State, id: string, fraction: number): State {
   if (!held) return state;
   const { guard, ...settings } = order.settings;
   const { draft } = cleared(state);
-  // Mending was asked for by what stood in the form, or for this edit alone: then it is not for those that follow.
-  const isOfForm = guard === undefined || sameJson(guard, state.draft.settings.guard);
+  // The guard that is set in the form stays for the orders that follow; another one was for this edit alone.
+  const { guard: guardOfForm } = state.draft.settings;
   const next = {
     ...draft, key: held.key, bodies: { ...draft.bodies, [held.key]: held.body }, updating: order.updating,
-    settings: isOfForm && guard !== undefined ? { ...settings, guard } : settings, remedy: isOfForm ? {} : { guard },
+    settings: guardOfForm === undefined ? settings : { ...settings, guard: guardOfForm }, remedy: guard === undefined || sameJson(guard, guardOfForm) ? {} : { guard },
     past: state.draft.past, step: state.draft.step,
   };
   const taken = { ...stepped({ ...state, refusal: "" }, next, `order ${id}`), selection: { ...state.selection, parts: held.parts } };

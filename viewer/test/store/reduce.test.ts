@@ -142,6 +142,27 @@ describe("an order that was refused", () => {
   });
 });
 
+describe("the guard that is set in the form", () => {
+  it("stays there where an order with another one comes back, or one with none", () => {
+    const ofForm = { min_scaled_jacobian: 0.1, otherwise: "reject" };
+    const mending = { min_scaled_jacobian: 0.03, otherwise: "untangle" };
+    for (const remedy of [{ guard: mending }, {}]) {
+      const { store, commands } = composed();
+      const read = (settings: { [key: string]: Json }): void =>
+        store.dispatch({ type: "form read", key: "scale_direction", body: { ...bodyOf(store.state.draft) }, settings, problems: [], step: "input guard" });
+      store.dispatch({ type: "remedy", settings: remedy });
+      commands.apply();
+      const { id } = store.state.orders[0]!;
+      store.dispatch({ type: "order", status: { id, status: "rejected" } });
+      read({ schedule: defaults.schedule, guard: ofForm });
+      store.dispatch({ type: "order taken up", id, fraction: 1 });
+      expect(wishedOrder(store.state)?.guard).toEqual(remedy.guard ?? ofForm);
+      commands.apply();
+      expect([store.state.draft.settings.guard, store.state.draft.remedy]).toEqual([ofForm, {}]);
+    }
+  });
+});
+
 describe("an earlier edit", () => {
   const stack = [pinch(0.5), { translate: { features: ["wall"], fixed: ["inlet"], by: [1, 0, 0], harmonic_order: 2, name: "shift" } }];
 
