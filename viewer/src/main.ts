@@ -405,7 +405,7 @@ function takeFrame(frame: Frame): void {
 }
 
 const memory = new Memory(store, keptRun, {
-  camera: scene.camera, pins, worst, monitored,
+  isEmbedded: onlyView !== null, camera: scene.camera, pins, worst, monitored,
   restored: () => {
     cameraTools.show();
     history.update();

@@ -18,6 +18,8 @@ const SWITCHES = ["skeleton", "compare"] as const;
 const isPressed = (id: string): boolean => part(id).getAttribute("aria-pressed") === "true";
 
 export interface Remembered {
+  /** Whether the page shows one view alone: what is kept is that of the whole page, which may be open beside it. */
+  isEmbedded: boolean;
   camera: Pick<Camera, "stand" | "isWhole" | "parallel" | "isPlaced">;
   pins: Pick<Pins, "kept" | "restore">;
   worst: Pick<WorstCells, "kept" | "restore" | "leave">;
@@ -37,7 +39,7 @@ export class Memory {
   constructor(private readonly store: Store<State, Action>, private readonly kept: KeptRun, private readonly parts: Remembered) {
     window.addEventListener("pagehide", () => {
       parts.worst.leave();
-      if (this.isRead) this.keep();
+      if (this.isRead && !parts.isEmbedded) this.keep();
     });
   }
 
@@ -47,6 +49,7 @@ export class Memory {
     this.isRead = true;
     // Only the run that this page was connected to before knows it by that.
     if (!back || knownIdentity()?.back !== back) return this.kept.forget();
+    if (this.parts.isEmbedded) return;
     const { camera, pins, worst, monitored } = this.parts;
     const kept = this.kept.read();
     if (kept.history !== null) monitored.restore(kept.history);

@@ -15,7 +15,7 @@ describe("a page that is loaded again", () => {
   let listeners: unknown[];
   const left = (): boolean => window.dispatchEvent(new Event("pagehide"));
   /** A page of a run, its camera and its switches; `drawn` draws its first picture. */
-  function opened(hello: Partial<Hello> = {}) {
+  function opened(hello: Partial<Hello> = {}, isEmbedded = false) {
     openDocument();
     const made = page({ views: [{ name: "surface", kind: "surface" }, { name: "cut", kind: "slice" }], ...hello });
     const pressed: string[] = [];
@@ -29,7 +29,7 @@ describe("a page that is loaded again", () => {
     let drawn = (): void => undefined;
     const restored = vi.fn();
     const memory = new Memory(made.store, new KeptRun(sessionStorage, "/"), {
-      camera, restored, whenDrawn: (then) => { drawn = then; }, pins: { kept: [], restore: vi.fn() },
+      isEmbedded, camera, restored, whenDrawn: (then) => { drawn = then; }, pins: { kept: [], restore: vi.fn() },
       worst: { kept: false, restore: vi.fn(), leave: vi.fn() }, monitored: { kept: () => null, restore: vi.fn() },
     });
     memory.greeted({ ...HELLO, ...hello });
@@ -51,10 +51,10 @@ describe("a page that is loaded again", () => {
     added.mockRestore();
   });
   /** Leaves a page, and opens it again. */
-  const again = (hello: Partial<Hello> = {}): ReturnType<typeof opened> => {
+  const again = (hello: Partial<Hello> = {}, isEmbedded = false): ReturnType<typeof opened> => {
     left();
     forgetListeners();
-    return opened(hello);
+    return opened(hello, isEmbedded);
   };
 
   it("is as it was: camera, projection, view and switches, also if it is left before its first picture", () => {
@@ -69,6 +69,16 @@ describe("a page that is loaded again", () => {
     late.drawn();
     expect([late.pressed, late.camera.stand, late.store.state.chosenView]).toEqual([["skeleton", "compare"], MOVED, "surface"]);
     expect(late.restored).toHaveBeenCalledOnce();
+  });
+
+  it("shares nothing with one that shows a view alone, in which another run's is forgotten all the same", () => {
+    Object.assign(opened().camera, { stand: MOVED, isWhole: false });
+    const alone = again({}, true);
+    expect(alone.camera.stand).toBe(STAND);
+    Object.assign(alone.camera, { stand: { ...MOVED, viewAngle: 50 }, isWhole: false });
+    expect(again().camera.stand).toEqual(MOVED);
+    again({ back: "another" }, true);
+    expect(sessionStorage.getItem("tombolo-run /")).toBeNull();
   });
 
   it("shows the whole where that was shown, as large as there is room for now", () => {
