@@ -15,7 +15,9 @@ const LONGEST = 200_000;
 
 /** What to keep; null where it is too much, or there is no form yet. */
 export function draftToKeep(state: State): KeptDraft | null {
-  if (!state.form) return state.keptDraft;
+  // Until the edits of the run have come, what was kept before is not in the form.
+  if (!saysSomething(state) && state.keptDraft) return state.keptDraft;
+  if (!state.form) return null;
   const { key, settings, remedy, updating, amount } = state.draft;
   const before = updating === null ? null : state.hello?.stack[updating] ?? null;
   const kept = { key, body: bodyOf(state.draft), settings, remedy, updating, amount, before, parts: state.selection.parts };

@@ -36,7 +36,7 @@ describe("what stands in the form", () => {
     expect(state.chosenView).toBe("cut");
     state = reduce(state, SCHEMA);
     // Loaded again once more before all had come: it is still to be kept.
-    expect(state.keptDraft).toBe(draft);
+    expect(draftToKeep(state)).toBe(draft);
     state = reduce(state, { type: "stack", edits: STACK, undoable: 1 });
     expect(wishedOrder(state)).toEqual(order);
     expect([state.keptDraft, state.draft.amount, state.refusal]).toEqual([null, { whole: expect.objectContaining({ factors: [1, 1, 0.2] }), fraction: 0.5 }, ""]);
@@ -80,6 +80,7 @@ describe("what stands in the form", () => {
     let state = reduce(again(kept().draft), SCHEMA);
     state = reduce(state, { type: "part", feature: "wall", part: "handle" });
     state = reduce(state, { type: "composed", key: "translate", values: { by: [7, 0, 0] }, step: "drag" });
+    expect(draftToKeep(state)?.body.by).toEqual([7, 0, 0]);
     state = reduce(state, { type: "stack", edits: [], undoable: 0 });
     expect([bodyOf(state.draft).by, state.keptDraft, state.selection.parts]).toEqual([[7, 0, 0], null, { wall: "handle" }]);
   });
