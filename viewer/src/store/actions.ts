@@ -3,7 +3,7 @@ import type { ConnectionState } from "../connection/connection";
 import type { FieldInformation, ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, PipelineChange, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
 import type { LanguageError } from "../kernel/language";
-import type { KeptDraft } from "./kept-draft";
+import type { KeptForm } from "./kept-draft";
 import type { Look } from "./looks";
 import type { AskedChange } from "./pipeline-drafts";
 import type { Pipeline } from "./pipelines";
@@ -62,7 +62,7 @@ export type Action =
   /** The browser has taken away what draws the picture, or given it back. */
   | { type: "picture lost"; isLost: boolean }
   /** The page was loaded again: what it showed, and what stood in the form. */
-  | { type: "remembered"; chosenView: string | null; draft: KeptDraft | null; dismissed: readonly string[] }
+  | { type: "remembered"; chosenView: string | null; draft: KeptForm | null; dismissed: readonly string[] }
   // The form. `step` names the field or gesture: all that it does is one step to take back.
   | { type: "form read"; key: string; body: Values; settings: Values; problems: readonly Problem[]; step: string }
   | { type: "action chosen"; key: string }

@@ -10,22 +10,27 @@ export interface KeptDraft extends Pick<Draft, "key" | "settings" | "remedy" | "
   body: Draft["settings"]; before: Json; parts: Readonly<Record<string, Part>>;
 }
 
+/** Stands for a draft that was too long to be kept. */
+export const TOO_LONG = "too long";
+export type KeptForm = KeptDraft | typeof TOO_LONG;
+
 /** The most characters of it: a region may hold very many faces. */
 const LONGEST = 200_000;
 
-/** What to keep; null where it is too much, or there is no form yet. */
-export function draftToKeep(state: State): KeptDraft | null {
+/** What to keep; null where there is no form yet. */
+export function draftToKeep(state: State): KeptForm | null {
   // Until the edits of the run have come, what was kept before is not in the form.
   if (!saysSomething(state) && state.keptDraft) return state.keptDraft;
   if (!state.form) return null;
   const { key, settings, remedy, updating, amount } = state.draft;
   const before = updating === null ? null : state.hello?.stack[updating] ?? null;
   const kept = { key, body: bodyOf(state.draft), settings, remedy, updating, amount, before, parts: state.selection.parts };
-  return JSON.stringify(kept).length > LONGEST ? null : kept;
+  return JSON.stringify(kept).length <= LONGEST ? kept : saysSomething(state) ? TOO_LONG : null;
 }
 
 /** What was kept, where it can be that. */
-export function readDraft(kept: unknown): KeptDraft | null {
+export function readDraft(kept: unknown): KeptForm | null {
+  if (kept === TOO_LONG) return kept;
   if (!isObject(kept)) return null;
   const { key, body, settings, remedy, updating, amount, before, parts } = kept;
   const isAmount = amount === null || (isObject(amount) && isObject(amount.whole) && typeof amount.fraction === "number" && amount.fraction >= 0 && amount.fraction <= 1);

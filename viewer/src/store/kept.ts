@@ -10,7 +10,7 @@ import { isSound } from "../picture/following";
 import { PINS } from "../picture/pins";
 import type { KeptPin } from "../picture/pins";
 import { readDraft } from "./kept-draft";
-import type { KeptDraft } from "./kept-draft";
+import type { KeptForm } from "./kept-draft";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
 import { ORDERS } from "./orders";
@@ -86,7 +86,7 @@ export interface KeptOfRun {
   camera: Stand | null;
   isParallel: boolean; isSkeletonShown: boolean; isCompared: boolean;
   chosenView: string | null;
-  draft: KeptDraft | null;
+  draft: KeptForm | null;
   dismissed: readonly string[];
 }
 

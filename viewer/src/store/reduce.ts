@@ -7,7 +7,7 @@ import { own } from "../own";
 import type { Action } from "./actions";
 import { bodyOf, fieldsBefore, isObject, kindOf, openBoundaries, partsOf, scaled, wishedOrder, withoutShorthand } from "./draft";
 import { asFormOrder } from "./edits";
-import { canTakeUp, draftOf, saysSomething, whyNotFitting } from "./kept-draft";
+import { TOO_LONG, canTakeUp, draftOf, saysSomething, whyNotFitting } from "./kept-draft";
 import { ordersDismissed, orderRefused, orderSent, orderTold, ordersReconciled } from "./orders";
 import { looksOf, withLook } from "./looks";
 import { pipelinesAfter } from "./pipeline-drafts";
@@ -308,12 +308,15 @@ function withKeptDraft(state: State): State {
   const kept = state.keptDraft;
   if (!kept || !canTakeUp(state)) return state;
   const without = { ...state, keptDraft: null };
-  if (saysSomething(state) || (kept.key !== null && kindOf(state, kept.key) === null)) return without;
+  const gone = (why: string): State => ({ ...without, refusal: `What stood in the form before the page was loaded again is gone: ${why}.` });
+  if (saysSomething(state)) return without;
+  if (kept === TOO_LONG) return gone("it was too long to be kept");
+  if (kept.key !== null && kindOf(state, kept.key) === null) return without;
   const why = whyNotFitting(state, kept);
   const draft = draftOf(without, kept);
   const next = { ...without, draft, selection: { ...state.selection, parts: kept.parts } };
   if (!saysSomething(next)) return why === "" ? next : without;
-  if (why !== "") return { ...without, refusal: `What stood in the form before the page was loaded again is gone: ${why}.` };
+  if (why !== "") return gone(why);
   return { ...stepped(without, draft, "kept"), selection: next.selection };
 }
 

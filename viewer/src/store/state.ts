@@ -2,7 +2,7 @@
 import type { ConnectionState } from "../connection/connection";
 import type { ForecastAnswer, Hello, Json, OrderStatus, Person, PinnedNote, Played, RunEnd, Status } from "../connection/protocol";
 import type { OrderForm, Values } from "../form/schema";
-import type { KeptDraft } from "./kept-draft";
+import type { KeptForm } from "./kept-draft";
 import type { Carried, Looks } from "./looks";
 import { NO_PIPELINES } from "./pipeline-drafts";
 import type { PipelinesState } from "./pipeline-drafts";
@@ -93,7 +93,7 @@ export interface State {
   form: OrderForm | null;
   draft: Draft;
   /** What stood in the form before the page was loaded again, until the run has told all that it can be of; null for nothing. */
-  keptDraft: KeptDraft | null;
+  keptDraft: KeptForm | null;
   /** Orders by the time they became known. */
   orders: readonly OrderRecord[];
   /** Stacks that an undo has left, the newest last. */

@@ -3,7 +3,7 @@ import type { Json } from "../../src/connection/protocol";
 import { orderForm } from "../../src/form/schema";
 import { asksNothing, bodyOf, wishedOrder } from "../../src/store/draft";
 import { draftToKeep, readDraft } from "../../src/store/kept-draft";
-import type { KeptDraft } from "../../src/store/kept-draft";
+import type { KeptDraft, KeptForm } from "../../src/store/kept-draft";
 import { reduce } from "../../src/store/reduce";
 import { INITIAL } from "../../src/store/state";
 import type { State } from "../../src/store/state";
@@ -19,11 +19,11 @@ function kept(): { draft: KeptDraft; order: Json } {
   store.dispatch({ type: "part", feature: "inlet", part: "fixed" });
   store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.2] }, step: "typed" });
   store.dispatch({ type: "amount", fraction: 0.5 });
-  return { draft: readDraft(JSON.parse(JSON.stringify(draftToKeep(store.state))))!, order: wishedOrder(store.state)! };
+  return { draft: readDraft(JSON.parse(JSON.stringify(draftToKeep(store.state)))) as KeptDraft, order: wishedOrder(store.state)! };
 }
 
 /** A page that has been loaded again: its first message comes with no edits, which are fetched. */
-function again(draft: KeptDraft, hello: Partial<typeof HELLO> = {}): State {
+function again(draft: KeptForm, hello: Partial<typeof HELLO> = {}): State {
   const connected = reduce(INITIAL, { type: "connection", state: "connected", explanation: "" });
   const greeted = reduce(connected, { type: "hello", hello: { ...HELLO, views: [{ name: "surface", kind: "surface" }, { name: "cut", kind: "slice" }], isAwaitingEdits: true, ...hello } });
   return reduce(greeted, { type: "remembered", chosenView: "cut", draft, dismissed: [] });
@@ -80,14 +80,21 @@ describe("what stands in the form", () => {
     let state = reduce(again(kept().draft), SCHEMA);
     state = reduce(state, { type: "part", feature: "wall", part: "handle" });
     state = reduce(state, { type: "composed", key: "translate", values: { by: [7, 0, 0] }, step: "drag" });
-    expect(draftToKeep(state)?.body.by).toEqual([7, 0, 0]);
+    expect(draftToKeep(state)).toMatchObject({ body: { by: [7, 0, 0] } });
     state = reduce(state, { type: "stack", edits: [], undoable: 0 });
     expect([bodyOf(state.draft).by, state.keptDraft, state.selection.parts]).toEqual([[7, 0, 0], null, { wall: "handle" }]);
   });
 
-  it("is not kept where it is as long as a region of a whole mesh", () => {
+  it("is gone in words where it is as long as a region of a whole mesh", () => {
     const { store } = page();
     store.dispatch({ type: "composed", key: "translate", values: { by: [1, 0, 0], region: { faces: Array.from({ length: 60_000 }, (_, i) => i) } }, step: "drag" });
+    const mark = readDraft(JSON.parse(JSON.stringify(draftToKeep(store.state))))!;
+    let state = reduce(again(mark), SCHEMA);
+    // Nobody has been told yet.
+    expect(draftToKeep(state)).toBe(mark);
+    state = reduce(state, { type: "stack", edits: [], undoable: 0 });
+    expect([state.keptDraft, state.refusal, asksNothing(state)]).toEqual([null, "What stood in the form before the page was loaded again is gone: it was too long to be kept.", true]);
+    store.dispatch({ type: "composed", key: "translate", values: { by: [0, 0, 0] }, step: "drag" });
     expect(draftToKeep(store.state)).toBeNull();
   });
 });
