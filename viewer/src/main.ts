@@ -82,6 +82,7 @@ import { NO_PIPELINES, readDrafts } from "./store/pipeline-drafts";
 import { LINE, WORST, withQuality } from "./store/pipelines";
 import { reduce } from "./store/reduce";
 import { Selection } from "./store/selection";
+import { writeForRun } from "./store/session";
 import { INITIAL } from "./store/state";
 import type { State } from "./store/state";
 import { Store, sameJson } from "./store/store";
@@ -94,13 +95,7 @@ const keptRun = new KeptRun(sessionStorage, location.pathname);
 /** Pipelines that are being written are kept over a reload of this page, and no longer. */
 const DRAFTS = `tombolo-drafts ${location.pathname}`;
 const store = new Store<State, Action>({ ...INITIAL, looks: kept.looks, pipelines: { ...NO_PIPELINES, drafts: readDrafts(sessionStorage.getItem(DRAFTS)) } }, reduce);
-store.watch((state) => state.pipelines.drafts, (drafts) => {
-  try {
-    sessionStorage.setItem(DRAFTS, JSON.stringify(drafts));
-  } catch {
-    // A browser that keeps nothing, or is full: the page works all the same.
-  }
-});
+store.watch((state) => state.pipelines.drafts, (drafts) => void writeForRun(sessionStorage, location.pathname, { [DRAFTS]: JSON.stringify(drafts) }));
 /** The first picture comes before all that can wait. */
 const later = new Later(1500);
 const report = (text: string): void => store.dispatch({ type: "unreadable", text });

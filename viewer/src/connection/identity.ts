@@ -1,4 +1,5 @@
 /** Under which name this viewer is known to the run: kept while the page is loaded again, and told to no other run of a relay. */
+import { writeForRun } from "../store/session";
 import type { Identity } from "./connection";
 
 const CLIENT = `tombolo-client ${location.pathname}`, BACK = `tombolo-back ${location.pathname}`;
@@ -10,6 +11,7 @@ export function knownIdentity(): Identity | null {
 }
 
 export function keepIdentity({ client, back }: Identity): void {
-  sessionStorage.setItem(CLIENT, client);
-  sessionStorage.setItem(BACK, back);
+  if (writeForRun(sessionStorage, location.pathname, { [CLIENT]: client, [BACK]: back })) return;
+  // Half of it, or that of before, would be another viewer's.
+  for (const key of [CLIENT, BACK]) sessionStorage.removeItem(key);
 }

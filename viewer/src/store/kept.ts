@@ -14,6 +14,8 @@ import type { KeptForm } from "./kept-draft";
 import { readLooks } from "./looks";
 import type { Looks } from "./looks";
 import { ORDERS } from "./orders";
+import { RUN, writeForRun } from "./session";
+import type { SessionStore } from "./session";
 
 const KEY = "tombolo-page";
 /** Longer than anything that the page writes for longer than its session. */
@@ -102,17 +104,13 @@ export class KeptRun {
   private readonly key: string;
 
   /** `path` tells the runs of a relay from each other. */
-  constructor(private readonly storage: Pick<Storage, "getItem" | "setItem" | "removeItem">, path: string) {
-    this.key = `tombolo-run ${path}`;
+  constructor(private readonly storage: SessionStore, private readonly path: string) {
+    this.key = RUN + path;
   }
 
   keep(kept: KeptOfRun): void {
-    try {
-      this.storage.setItem(this.key, JSON.stringify(kept));
-    } catch {
-      // As above; but nothing old is left, which would be taken for what was said last.
-      this.forget();
-    }
+    // Nothing old is left, which would be taken for what was said last.
+    if (!writeForRun(this.storage, this.path, { [this.key]: JSON.stringify(kept) })) this.forget();
   }
 
   read(): KeptOfRun {

@@ -9,6 +9,8 @@ describe("what is kept of a run over a reload", () => {
     getItem: (key: string) => stored.get(key) ?? null,
     setItem: (key: string, text: string) => void stored.set(key, text),
     removeItem: (key: string) => void stored.delete(key),
+    key: (index: number) => [...stored.keys()][index] ?? null,
+    get length() { return stored.size; },
   };
   const PIN = { name: "probe 2", view: "cut", point: [1, 0.5, 0] as [number, number, number] };
   const CAMERA = { position: [0, 0, 3], focalPoint: [0, 0, 0], viewUp: [0, 1, 0], parallel: true, parallelScale: 2, viewAngle: 30, middle: [0.1, 0] } as KeptOfRun["camera"];
