@@ -239,8 +239,8 @@ const earlier: Earlier = new Earlier(store, () => [...scene.layers.values()].fil
 });
 const compare = new Compare(part("before"), part("compare"), scene, earlier, {
   views: () => store.state.hello?.views ?? [], looks: () => store.state.looks, features: () => store.state.hello?.features ?? [], selection, trouble: report,
+  shown: (isShown) => { part("now").hidden = !isShown; },
 });
-part("compare").addEventListener("click", () => { part("now").hidden = part("before").hidden; });
 const following = new Following(store, commands, scene.camera, () => cameraTools.show());
 const worst = new WorstCells(part("quality"), store, pipelines, scene, marks);
 const cameraTools = new CameraTools(part("tools"), scene);
@@ -400,7 +400,7 @@ function takeFrame(frame: Frame): void {
 }
 
 const memory = new Memory(store, keptRun, {
-  isEmbedded: onlyView !== null, camera: scene.camera, pins, worst, monitored,
+  isEmbedded: onlyView !== null, camera: scene.camera, compare, pins, worst, monitored,
   restored: () => {
     cameraTools.show();
     history.update();

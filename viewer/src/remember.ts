@@ -5,6 +5,7 @@ import { part } from "./dom";
 import type { History } from "./history/series";
 import type { WorstCells } from "./panels/quality";
 import type { Camera } from "./picture/camera";
+import type { Compare } from "./picture/compare";
 import type { Pins } from "./picture/pins";
 import type { Action } from "./store/actions";
 import { LONGEST_HISTORY, LONGEST_ORDER } from "./store/kept";
@@ -21,6 +22,7 @@ export interface Remembered {
   /** Whether the page shows one view alone: what is kept is that of the whole page, which may be open beside it. */
   isEmbedded: boolean;
   camera: Pick<Camera, "stand" | "isWhole" | "parallel" | "isPlaced">;
+  compare: Pick<Compare, "restore">;
   pins: Pick<Pins, "kept" | "restore">;
   worst: Pick<WorstCells, "kept" | "restore" | "leave">;
   monitored: Pick<History, "kept" | "restore">;
@@ -64,7 +66,10 @@ export class Memory {
   }
 
   private switchOn(): void {
-    for (const id of this.waiting) if (!isPressed(id)) part(id).click();
+    for (const id of this.waiting) {
+      if (id === "compare") this.parts.compare.restore();
+      else if (!isPressed(id)) part(id).click();
+    }
     this.waiting = [];
   }
 

@@ -29,7 +29,7 @@ describe("a page that is loaded again", () => {
     let drawn = (): void => undefined;
     const restored = vi.fn();
     const memory = new Memory(made.store, new KeptRun(sessionStorage, "/"), {
-      isEmbedded, camera, restored, whenDrawn: (then) => { drawn = then; }, pins: { kept: [], restore: vi.fn() },
+      isEmbedded, camera, restored, compare: { restore: () => pressed.push("compare as it was") }, whenDrawn: (then) => { drawn = then; }, pins: { kept: [], restore: vi.fn() },
       worst: { kept: false, restore: vi.fn(), leave: vi.fn() }, monitored: { kept: () => null, restore: vi.fn() },
     });
     memory.greeted({ ...HELLO, ...hello });
@@ -67,7 +67,7 @@ describe("a page that is loaded again", () => {
     early.camera.isWhole = false;
     const late = again();
     late.drawn();
-    expect([late.pressed, late.camera.stand, late.store.state.chosenView]).toEqual([["skeleton", "compare"], MOVED, "surface"]);
+    expect([late.pressed, late.camera.stand, late.store.state.chosenView]).toEqual([["skeleton", "compare as it was"], MOVED, "surface"]);
     expect(late.restored).toHaveBeenCalledOnce();
   });
 

@@ -15,6 +15,8 @@ export interface CompareSource {
   looks(): Looks;
   features(): readonly FeatureInformation[];
   selection: Selection;
+  /** It is shown now, or put away. */
+  shown(isShown: boolean): void;
   trouble(message: string): void;
 }
 
@@ -31,16 +33,24 @@ export class Compare {
   constructor(private readonly root: HTMLElement, private readonly button: HTMLElement, private readonly main: Scene, private readonly earlier: Earlier, private readonly source: CompareSource) {
     const keep = element("button", { type: "button", class: "small", title: "Compares with what is there now, from now on", onclick: () => earlier.keepNow() }, "Keep this moment");
     root.append(this.place, element("div", { class: "captions" }, this.caption, keep));
-    button.addEventListener("click", () => this.toggle());
+    button.addEventListener("click", () => {
+      this.show(!this.shown);
+      // Each has half the room now, or all of it again.
+      requestAnimationFrame(() => requestAnimationFrame(() => this.main.camera.fit()));
+    });
   }
 
-  private toggle(): void {
-    this.shown = !this.shown;
-    this.button.setAttribute("aria-pressed", String(this.shown));
-    this.root.hidden = !this.shown;
-    // Each has half the room now, or all of it again.
-    requestAnimationFrame(() => requestAnimationFrame(() => this.main.camera.fit()));
-    if (!this.shown) return;
+  /** Shows it as it was before the page was loaded again: the camera stands where it stood beside it. */
+  restore(): void {
+    if (!this.shown) this.show(true);
+  }
+
+  private show(isShown: boolean): void {
+    this.shown = isShown;
+    this.button.setAttribute("aria-pressed", String(isShown));
+    this.root.hidden = !isShown;
+    this.source.shown(isShown);
+    if (!isShown) return;
     if (this.earlier.moment.size === 0) this.earlier.keepNow();
     this.scene ??= new Scene(this.place, makeCanvas(), this.source.selection, {
       bars: () => undefined,

@@ -44,6 +44,7 @@ describe("before and after side by side", () => {
   let main: StandIn;
   let compare: Compare;
   let shown: ReturnType<typeof content>[];
+  let told: boolean[];
   const caption = (): string => root.querySelector(".caption")!.textContent;
   const before = (): StandIn => made.at(-1)!;
   const bar = (low: number, high: number): Bar => ({ key: "p", range: [low, high], views: ["cut"] }) as unknown as Bar;
@@ -51,13 +52,13 @@ describe("before and after side by side", () => {
   beforeEach(() => {
     made.length = 0;
     const { store } = page();
-    [root, button, shown] = [document.createElement("div"), document.createElement("button"), [content("cut", 5)]];
+    [root, button, shown, told] = [document.createElement("div"), document.createElement("button"), [content("cut", 5)], []];
     root.hidden = true;
     main = new StandIn(null, null, null);
     made.length = 0;
     const looks = Object.fromEntries(VIEWS.map((view) => [view.name, firstLook(view, VIEWS, [])]));
     const earlier = new Earlier(store, () => shown, () => compare.update());
-    compare = new Compare(root, button, main as unknown as Scene, earlier, { views: () => VIEWS, looks: () => looks, features: () => [], selection: new Selection(store), trouble: () => undefined });
+    compare = new Compare(root, button, main as unknown as Scene, earlier, { views: () => VIEWS, looks: () => looks, features: () => [], selection: new Selection(store), trouble: () => undefined, shown: (isShown) => told.push(isShown) });
   });
 
   it("shows the moment that is kept, or what is there where none is, until it is put away", () => {
@@ -86,6 +87,20 @@ describe("before and after side by side", () => {
     expect(before().looks.late!.range.kind).not.toBe("fixed");
     compare.setBars([bar(1, 4)]);
     expect(before().looks.cut!.range).toMatchObject({ low: 1, high: 4 });
+  });
+
+  it("is fitted into its half where it is switched on, and not where it was so before the page was loaded again", () => {
+    vi.stubGlobal("requestAnimationFrame", (then: () => void) => then());
+    const fit = vi.spyOn(main.camera, "fit");
+    compare.restore();
+    compare.restore();
+    expect([told, root.hidden, button.getAttribute("aria-pressed"), caption(), fit.mock.calls.length]).toEqual([[true], false, "true", "at cycle 5", 0]);
+    for (const times of [1, 2]) {
+      button.click();
+      expect(fit).toHaveBeenCalledTimes(times);
+    }
+    expect(told).toEqual([true, false, true]);
+    vi.unstubAllGlobals();
   });
 
   it("is seen from the same place, whichever of the two is turned", () => {
