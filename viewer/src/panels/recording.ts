@@ -45,8 +45,8 @@ export class RecordingPanel {
     this.button.addEventListener("click", () => {
       const { played, hello } = this.store.state;
       // From its end a recording begins again.
-      const again = played?.at_end ? { seek: { seconds: hello?.recording?.first.seconds ?? 0 } } : {};
-      this.commands.ask({ play: { ...again, paused: played?.at_end ? false : !played?.paused } });
+      if (played?.at_end) this.goTo(hello?.recording?.first.seconds ?? 0, { paused: false });
+      else this.commands.ask({ play: { paused: !played?.paused } });
     });
     this.speed.addEventListener("change", () => this.commands.ask({ play: { speed: Number(this.speed.value) } }));
   }
@@ -59,7 +59,13 @@ export class RecordingPanel {
   private seek(): void {
     this.unsent = false;
     this.sentAt = performance.now();
-    this.commands.ask({ play: { seek: { seconds: Number(this.slider.value) } } });
+    this.goTo(Number(this.slider.value));
+  }
+
+  private goTo(seconds: number, more: { paused?: boolean } = {}): void {
+    if (this.commands.ask({ play: { seek: { seconds }, ...more } }) === null) return;
+    // The note that was looked for is of another moment.
+    this.store.dispatch({ type: "note sought", note: null });
   }
 
   private show(): void {

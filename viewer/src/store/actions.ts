@@ -43,8 +43,8 @@ export type Action =
   | { type: "order sent"; id: string; order: Json; at: number }
   | { type: "order dismissed"; id: string }
   | { type: "wheel answered" }
-  /** The recording is to go to the cycle of a note. */
-  | { type: "note sought"; note: PinnedNote }
+  /** The recording is to go to the cycle of a note; null where it is to go elsewhere. */
+  | { type: "note sought"; note: PinnedNote | null }
   | { type: "following"; on: boolean }
   | { type: "pipelines asked"; asked: Pick<AskedChange, "id" | "key" | "name" | "text"> }
   // The pipelines that are being written; `began` is what counts as nothing written, the text itself where it is left out.

@@ -166,7 +166,7 @@ function withHello(state: State, hello: Hello): State {
 function notesOf({ notes: known, soughtNote }: State, { notes, recording }: Hello): Pick<State, "notes" | "soughtNote"> {
   if (!notes) return { notes: known, soughtNote };
   const isUntold = recording && soughtNote && !notes.some(({ number }) => number === soughtNote.number);
-  return { notes: isUntold ? [...notes, soughtNote] : notes, soughtNote: null };
+  return isUntold ? { notes: [...notes, soughtNote], soughtNote } : { notes, soughtNote: null };
 }
 
 function withParameters(state: State, values: Readonly<Record<string, number>>): State {

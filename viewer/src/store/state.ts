@@ -110,7 +110,7 @@ export interface State {
   following: boolean;
   /** The notes that are pinned, the oldest first. */
   notes: readonly PinnedNote[];
-  /** The note to whose cycle a recording is on its way; null for none. */
+  /** The note to whose cycle a recording was taken, as long as it is not told there yet; null for none. */
   soughtNote: PinnedNote | null;
   pipelines: PipelinesState;
   /** Whether the browser has taken away what draws the picture. */

@@ -1,7 +1,7 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
 import { parseServerMessage } from "../../src/connection/protocol";
-import type { OrderStatus, Played } from "../../src/connection/protocol";
+import type { OrderStatus, PinnedNote, Played } from "../../src/connection/protocol";
 import { RecordingPanel } from "../../src/panels/recording";
 import { appliedOrders, isShapeUnderWay } from "../../src/store/orders";
 import { whyNotSteering } from "../../src/store/run";
@@ -90,6 +90,28 @@ describe("the slider of a recording", () => {
     speed.value = "16";
     speed.dispatchEvent(new Event("change"));
     expect(made.sent.at(-1)).toMatchObject({ play: { speed: 16 } });
+  });
+
+  it("goes where no note is looked for any more", () => {
+    const gap: PinnedNote = { number: 2, text: "the gap", at: [0, 0, 0], cycle: 80, by: "Anna" };
+    const numbers = (): number[] => made.store.state.notes.map(({ number }) => number);
+    made.greet({ recording, notes: [] });
+    const goOn = (): void => {
+      made.store.dispatch({ type: "played", played: played({ at_end: true }) });
+      button().click();
+    };
+    const drag = (): void => {
+      slider().dispatchEvent(new Event("input"));
+      slider().dispatchEvent(new Event("change"));
+    };
+    for (const go of [drag, goOn]) {
+      made.store.dispatch({ type: "note sought", note: gap });
+      made.greet({ recording, notes: [] });
+      expect(numbers()).toEqual([2]);
+      go();
+      made.greet({ recording, notes: [] });
+      expect(numbers(), go.name).toEqual([]);
+    }
   });
 
   it("shows the speed at which it goes on, also after the connection came back", () => {
