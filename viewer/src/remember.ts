@@ -81,7 +81,7 @@ export class Memory {
       camera: camera.isPlaced && !camera.isWhole ? camera.stand : null, isParallel: camera.parallel,
       isSkeletonShown: isOn("skeleton"), isCompared: isOn("compare"),
       chosenView: this.store.state.chosenView, draft: draftToKeep(this.store.state),
-      dismissed: this.store.state.orders.flatMap(({ id, dismissed }) => (dismissed === true && id.length <= LONGEST_ORDER ? [id] : [])),
+      dismissed: this.store.state.dismissed.filter((id) => id.length <= LONGEST_ORDER),
     });
   }
 }

@@ -36,7 +36,7 @@ export class EditsPanel {
   private announced = new Map<string, OrderPhase>();
 
   constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
-    const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.draft.updating, whyNotEditable(state), state.form, state.people];
+    const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.dismissed, state.draft.updating, whyNotEditable(state), state.form, state.people];
     store.watch(seen, () => this.show(), (a, b) => (a as unknown[]).every((value, i) => Object.is(value, (b as unknown[])[i])));
     store.watch((state) => state.orders, (orders) => this.announce(orders));
     store.watch(undoState, (now) => this.showUndo(now), sameJson);
@@ -62,7 +62,7 @@ export class EditsPanel {
     this.markDrag();
     part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
     this.pending.replaceChildren(...state.orders.filter(isPending).map((order) => this.pendingRow(order)),
-      ...state.orders.filter((order) => isRefused(order) && !order.dismissed).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
+      ...state.orders.filter((order) => isRefused(order) && !state.dismissed.includes(order.id)).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
     part("history").hidden = state.orders.length === 0;
     write(part("history-title"), `Everything that happened (${state.orders.length})`);
     this.history.replaceChildren(...[...state.orders].reverse().map((order) => historyRow(order, state)));

@@ -47,9 +47,9 @@ export function withdrawalOf({ status, reason }: OrderRecord): Withdrawal | null
   return how === "cancelled" || how === "replaced" ? { how, by: by ?? null } : null;
 }
 
-/** Takes orders off the list of what was refused. */
-export function ordersDismissed(orders: readonly OrderRecord[], ids: readonly string[]): readonly OrderRecord[] {
-  return orders.some(({ id }) => ids.includes(id)) ? orders.map((order) => (ids.includes(order.id) ? { ...order, dismissed: true } : order)) : orders;
+/** The orders that were taken off the list of what was refused, and those that are taken off now. */
+export function ordersDismissed(dismissed: readonly string[], ids: readonly string[]): readonly string[] {
+  return [...dismissed.filter((id) => !ids.includes(id)), ...ids].slice(-ORDERS);
 }
 
 /** Whether the shape is on its way to another: an order is being computed or carried out. */

@@ -60,7 +60,7 @@ function after(state: State, action: Action): State {
       const isOurs = state.orders.some((order) => order.id === action.status.id);
       return { ...state, orders: orderTold(state.orders, action.status), undone: isOurs ? state.undone : [] };
     }
-    case "order dismissed": return { ...state, orders: ordersDismissed(state.orders, [action.id]) };
+    case "order dismissed": return { ...state, dismissed: ordersDismissed(state.dismissed, [action.id]) };
     case "played": return { ...state, played: action.played };
     case "end": return { ...state, ...NOBODY, end: action.end, askedBy: null };
     case "wheel asked": return { ...state, askedBy: action.by };
@@ -91,7 +91,7 @@ function after(state: State, action: Action): State {
     }
     case "remembered": {
       const isThere = state.hello?.views.some(({ name }) => name === action.chosenView);
-      return { ...state, keptDraft: action.draft, orders: ordersDismissed(state.orders, action.dismissed), chosenView: isThere ? action.chosenView : state.chosenView };
+      return { ...state, keptDraft: action.draft, dismissed: ordersDismissed(state.dismissed, action.dismissed), chosenView: isThere ? action.chosenView : state.chosenView };
     }
     case "view chosen": return { ...state, chosenView: action.view };
     case "part": {

@@ -41,7 +41,7 @@ export interface Draft {
 
 /** The states that the server tells, and the two that only this viewer knows. */
 export type OrderPhase = OrderStatus["status"] | "sent" | "lost";
-export interface OrderRecord extends Omit<OrderStatus, "status"> { status: OrderPhase; text: string; sentAt: number | null; /** Taken off the list by hand. */ dismissed?: boolean }
+export interface OrderRecord extends Omit<OrderStatus, "status"> { status: OrderPhase; text: string; sentAt: number | null }
 
 export interface PreviewState {
   state: "none" | "waiting" | "shown" | "failed";
@@ -96,6 +96,8 @@ export interface State {
   keptDraft: KeptForm | null;
   /** Orders by the time they became known. */
   orders: readonly OrderRecord[];
+  /** The refused orders that were taken off the list by hand, by their ids: a recording tells its orders anew at each moment. */
+  dismissed: readonly string[];
   /** Stacks that an undo has left, the newest last. */
   undone: readonly Json[][];
   preview: PreviewState;
@@ -134,7 +136,7 @@ export const INITIAL: State = {
   form: null,
   draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
   keptDraft: null,
-  orders: [], undone: [],
+  orders: [], dismissed: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,
   askedBy: null, people: [], followedBy: 0, following: false, notes: [], soughtNote: null, pipelines: NO_PIPELINES, isPictureLost: false, refusal: "", errors: [],
 };

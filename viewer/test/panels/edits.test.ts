@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
-import type { Json } from "../../src/connection/protocol";
+import type { Json, OrderStatus } from "../../src/connection/protocol";
 import { EditsPanel } from "../../src/panels/edits";
 import { bodyOf } from "../../src/store/draft";
 import { move, remove, rename, toggleMute } from "../../src/store/edits";
@@ -197,6 +197,17 @@ describe("the list of edits", () => {
     document.querySelector<HTMLElement>("#pending .icon")!.click();
     expect(document.querySelector("#pending")!.textContent).toBe("");
     expect(document.querySelector("#orders")!.textContent).toMatch(/cells invert/);
+  });
+
+  it("shows no refusal again that was dismissed, also where a recording goes back to before it and on again", () => {
+    const recording = { first: { seconds: 0, cycle: 0, time: 0 }, last: { seconds: 9, cycle: 900, time: 9 } };
+    const rejected = (id: string): OrderStatus => ({ id, status: "rejected", order: { edits: [shift(9)] }, reason: "cells invert" });
+    const shown = (): (string | undefined)[] => [...document.querySelectorAll<HTMLElement>("#pending [data-order]")].map((row) => row.dataset.order);
+    made.greet({ recording, orders: [rejected("o1"), rejected("o2")] });
+    document.querySelector<HTMLElement>('#pending [data-order="o1"] .icon')!.click();
+    expect(shown()).toEqual(["o2"]);
+    for (const orders of [[], [rejected("o1"), rejected("o2")]]) made.greet({ recording, orders });
+    expect(shown()).toEqual(["o2"]);
   });
 
   it("does not call what somebody took back refused, and says who did", () => {
