@@ -28,10 +28,11 @@ export class EditsPanel {
   private readonly list = part("stack");
   private readonly pending = part("pending");
   private readonly history = part("orders");
-  /** The row that is being dragged, and the one whose name is being typed. */
+  /** The row that is being dragged, the one that it would be put to, and what ends the drag. */
   private drag: { from: number; over: number | null; end: (to: number | null) => void } | null = null;
   /** The edit that was moved last, from where and to where: the focus goes with it. */
   private moved: { edit: Json; from: number; to: number } | null = null;
+  /** The edit whose name is being typed. */
   private renaming: number | null = null;
   private announced = new Map<string, OrderPhase>();
 
@@ -66,20 +67,40 @@ export class EditsPanel {
     part("history").hidden = state.orders.length === 0;
     write(part("history-title"), `Everything that happened (${state.orders.length})`);
     this.history.replaceChildren(...[...state.orders].reverse().map((order) => historyRow(order, state)));
-    if (focus && !isTyping) (this.list.querySelector<HTMLElement>(focus.exact) ?? this.list.querySelector<HTMLElement>(focus.near) ?? part("undo")).focus();
+    if (focus && !isTyping) (focus() ?? part("undo")).focus();
   }
 
-  /** Where the focus is in the list, so that it can be put there again. */
-  private focused(): { exact: string; near: string } | null {
+  /** Where the focus is in the lists, so that it can be put there again once they are made anew; null where it is elsewhere. */
+  private focused(): (() => HTMLElement | null) | null {
     const active = document.activeElement as HTMLElement | null;
-    const row = active?.closest<HTMLElement>("[data-edit]");
-    if (!active || !row || !this.list.contains(active)) return null;
+    if (!active) return null;
+    return this.list.contains(active) ? this.focusedEdit(active) : this.pending.contains(active) ? this.focusedOrder(active) : null;
+  }
+
+  /** The same button of the same order, or another of its own; the same of the row that has taken its place where it is gone. */
+  private focusedOrder(active: HTMLElement): (() => HTMLElement | null) | null {
+    const row = active.closest<HTMLElement>("[data-order]");
+    if (!row) return null;
+    const at = [...this.pending.children].indexOf(row);
+    const wanted = `[data-act="${active.dataset.act ?? ""}"]`;
+    return () => {
+      const rows = [...this.pending.children] as HTMLElement[];
+      const same = rows.find(({ dataset }) => dataset.order === row.dataset.order);
+      const near = same ?? rows[Math.min(at, rows.length - 1)];
+      return near?.querySelector<HTMLElement>(wanted) ?? same?.querySelector("button") ?? null;
+    };
+  }
+
+  private focusedEdit(active: HTMLElement): (() => HTMLElement | null) | null {
+    const row = active.closest<HTMLElement>("[data-edit]");
+    if (!row) return null;
     const act = active.dataset.act ?? "load";
     const { moved } = this;
     const index = moved?.from === Number(row.dataset.edit) && sameJson(this.stack[moved.to], moved.edit) ? moved.to : Number(row.dataset.edit);
     if (index === moved?.to) this.moved = null;
     const last = Math.max(0, Math.min(index, this.stack.length - 1));
-    return { exact: `[data-edit="${index}"] [data-act="${act}"]`, near: `[data-edit="${last}"] [data-act="${act}"]` };
+    const find = (at: number): HTMLElement | null => this.list.querySelector<HTMLElement>(`[data-edit="${at}"] [data-act="${act}"]`);
+    return () => find(index) ?? find(last);
   }
 
   private row(edit: Json, index: number, order: OrderRecord | null): HTMLElement {
@@ -212,14 +233,14 @@ export class EditsPanel {
     const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, done);
     return element("li", { "data-order": order.id, "data-status": order.status },
       element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order)),
-        steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
+        steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", "data-act": "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
       bar, element("div", { class: "detail" }, detailOf(order, this.store.state)));
   }
 
   private refusedRow(order: OrderRecord): HTMLElement {
     return element("li", { "data-order": order.id, "data-status": outcomeStatus(order) },
       element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order)),
-        element("button", { type: "button", class: "icon", title: "Take it off the list", "aria-label": `Dismiss: ${order.text}`, onclick: () => this.store.dispatch({ type: "order dismissed", id: order.id }) }, "×")),
+        element("button", { type: "button", class: "icon", "data-act": "dismiss", title: "Take it off the list", "aria-label": `Dismiss: ${order.text}`, onclick: () => this.store.dispatch({ type: "order dismissed", id: order.id }) }, "×")),
       element("div", { class: "detail" }, detailOf(order, this.store.state)), element("div", { class: "ways" }, ...this.waysBack(order)));
   }
 

@@ -210,6 +210,26 @@ describe("the list of edits", () => {
     expect(shown()).toEqual(["o2"]);
   });
 
+  it("keeps the focus on the buttons of an order, whatever becomes of it and whoever comes", () => {
+    const told = (id: string, status: "computing" | "rejected"): void => made.store.dispatch({ type: "order", status: { id, status, order: { edits: [shift(9)] }, reason: "cells invert" } });
+    const at = (id: string, act: string): HTMLElement => document.querySelector<HTMLElement>(`#pending [data-order="${id}"] [data-act="${act}"]`)!;
+    told("o1", "rejected");
+    told("o2", "computing");
+    at("o2", "cancel").focus();
+    made.store.dispatch({ type: "people", viewers: [] });
+    expect(document.activeElement).toBe(at("o2", "cancel"));
+    told("o2", "rejected");
+    expect(document.activeElement).toBe(at("o2", "dismiss"));
+    at("o1", "again").focus();
+    made.store.dispatch({ type: "people", viewers: [{ client: "c2", name: "Anna", role: "watcher", may_drive: true }] });
+    expect(document.activeElement).toBe(at("o1", "again"));
+    at("o1", "dismiss").focus();
+    at("o1", "dismiss").click();
+    expect(document.activeElement).toBe(at("o2", "dismiss"));
+    at("o2", "dismiss").click();
+    expect(document.activeElement?.id).toBe("undo");
+  });
+
   it("does not call what somebody took back refused, and says who did", () => {
     const rejected = (id: string, reason: string): void => made.store.dispatch({ type: "order", status: { id, status: "rejected", order: { edits: [shift(9)] }, reason } });
     const told = (id: string): (string | undefined)[] => {
