@@ -80,22 +80,37 @@ const steps = [
     await page.check('input[aria-label="throat: handle"]');
     await viewer.field("factors z").fill("0.7");
     await viewer.until("the forecast", ({ forecast }) => forecast.state === "told");
-    // Every range that the bar shows while the order changes the shape.
+    // Of so many cycles that the order is still under way when the page, however slow, has been looked at.
+    await viewer.scheduled(10, 30);
+    // Every range that the bar shows while the order changes the shape, and the cycles of the frames that it is shown with.
     await page.evaluate(() => {
-      window.ranges = new Set();
+      window.seen = { ranges: new Set(), cycles: new Set() };
       const watching = setInterval(() => {
         const status = window.tombolo.orders.at(-1)?.status;
-        if (status === "applying") window.ranges.add([...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to "));
-        else if (status === "applied") clearInterval(watching);
+        if (status === "applying") {
+          window.seen.ranges.add([...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to "));
+          window.seen.cycles.add(window.tombolo.views.midplane.cycle);
+        } else if (status === "applied" || status === "rejected") clearInterval(watching);
       }, 20);
     });
+    const rests = async (paused) => {
+      await page.click("#pause");
+      await viewer.until(paused ? "the run paused" : "the run going on", (now) => now.status?.paused === paused);
+    };
     await page.click("#apply");
-    await viewer.until("the order under way", ({ orders }) => orders.length === 1 && orders[0].status !== "sent");
+    await viewer.until("shapes and frames on the way", ({ orders }) => {
+      check(orders.at(-1)?.status !== "rejected", `the pinch was refused: ${orders.at(-1)?.reason}`);
+      return orders.length === 1 && orders[0].status === "applying" && orders[0].shape >= 2;
+    });
+    await rests(true);
     await viewer.clean("with an order under way");
+    const { orders: [underWay] } = await viewer.look();
+    check(underWay.status === "applying", `axe has looked at an order that is ${underWay.status}`);
+    await rests(false);
     const order = await viewer.settled(new Set());
     check(order.status === "applied", `the pinch was refused: ${order.reason}`);
-    const ranges = await page.evaluate(() => [...window.ranges]);
-    check(ranges.length === 1, `while the order was under way the range was ${ranges.join(", then ") || "not seen"}`);
+    const { ranges, cycles } = await page.evaluate(() => ({ ranges: [...window.seen.ranges], cycles: [...window.seen.cycles] }));
+    check(ranges.length === 1 && cycles.length > 1, `while the order was under way, with frames of ${cycles.length} cycles, the range was ${ranges.join(", then ") || "not seen"}`);
     await viewer.holds("another range after it", (before) => [...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to ") !== before, ranges[0]);
     shared.order = order;
     await viewer.holds("both profiles", () => document.querySelectorAll("#dock .dock-body:not([hidden]) tbody tr").length === 2);

@@ -234,9 +234,7 @@ const steps = [
     check(shared.pixels > 20, `the throat is only ${shared.pixels} pixels high`);
     const known = new Set((await look()).orders.map((order) => order.id));
     for (const [axis, factor] of [["x", 1], ["y", 1], ["z", FACTOR]]) await page.fill(`.object:not([hidden]) input[aria-label="factors ${axis}"]`, String(factor));
-    await page.click(".schedule summary");
-    await page.getByLabel("schedule steps", { exact: true }).fill(scheduleSteps);
-    await page.getByLabel("schedule every", { exact: true }).first().fill(scheduleEvery);
+    await viewer.scheduled(scheduleSteps, scheduleEvery);
     await until("the preview of the order", (now) => now.preview.state === "shown");
     await viewer.filmed("half-as-high", "right");
     await page.click("#apply");

@@ -108,15 +108,14 @@ export class Viewer {
     }, [png, colour, tolerance]);
   }
 
-  /** The controls that are lower or narrower than the 24 pixels that a finger needs; what has a label can be met there too. */
+  /** The controls that are lower or narrower than the 24 pixels that a finger needs; a label that is as large does for its control. */
   small() {
     return this.page.evaluate(() => [...document.querySelectorAll("button, input, select, textarea, summary, [role=tab], a[href]")]
       .filter((control) => control.checkVisibility({ visibilityProperty: true }) && !control.classList.contains("skip"))
       .flatMap((control) => {
         const boxes = [control, ...(control.labels ?? [])].map((part) => part.getBoundingClientRect());
-        const width = Math.max(...boxes.map(({ right }) => right)) - Math.min(...boxes.map(({ left }) => left));
-        const height = Math.max(...boxes.map(({ bottom }) => bottom)) - Math.min(...boxes.map(({ top }) => top));
-        return width < 24 || height < 24 ? [`${control.id || control.getAttribute("aria-label") || control.textContent} ${Math.round(width)} x ${Math.round(height)}`] : [];
+        const [box] = boxes;
+        return boxes.some(({ width, height }) => width >= 24 && height >= 24) ? [] : [`${control.id || control.getAttribute("aria-label") || control.textContent} ${Math.round(box.width)} x ${Math.round(box.height)}`];
       }));
   }
 
@@ -178,6 +177,14 @@ export class Viewer {
   /** A number of the edit that is in the form. */
   field(label) {
     return this.page.locator(`.object:not([hidden]) input[aria-label="${label}"]`);
+  }
+
+  /** Sets how many shapes the order in the form has, and the cycles between them. */
+  async scheduled(shapes, every) {
+    const steps = this.page.getByLabel("schedule steps", { exact: true });
+    if (!(await steps.isVisible())) await this.page.click(".schedule summary");
+    await steps.fill(String(shapes));
+    await this.page.getByLabel("schedule every", { exact: true }).first().fill(String(every));
   }
 
   /** The extent of a feature along an axis, as it is now. */

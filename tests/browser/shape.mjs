@@ -27,13 +27,6 @@ const given = async (act) => {
   await act();
   return first.settled(known);
 };
-/** Sets how many shapes an order has, and the steps between them. */
-const scheduled = async (shapes, every) => {
-  const steps = page.getByLabel("schedule steps", { exact: true });
-  if (!(await steps.isVisible())) await page.click(".schedule summary");
-  await steps.fill(String(shapes));
-  await page.getByLabel("schedule every", { exact: true }).first().fill(String(every));
-};
 /** Has the run rest, or go on. */
 const rests = async (paused) => {
   await page.click("#pause");
@@ -199,15 +192,19 @@ const steps = [
       const seen = await first.until("the page again", (now) => now.connection === "connected" && now.frames > 0 && now.status?.paused === true && now.orders.length > known.size);
       check(seen.role === "driver" && (await page.evaluate(() => window.tombolo.client)) === client, `the page that was loaded again is a ${seen.role}`);
       check(own(seen).length === 1, `after it there are the orders ${JSON.stringify(own(seen))}`);
-      const [{ id, status }] = own(seen);
-      const row = page.locator(`#pending [data-order="${id}"]`);
-      check((await row.count()) === 1 && (await row.getAttribute("data-status")) === status && said.test(await row.innerText()), `the order is ${status}, its row says "${await row.allInnerTexts()}"`);
-      return row;
+      const [{ id }] = own(seen);
+      // Both at one moment, for the order goes on as it is planned.
+      const { status, rows } = await page.evaluate((wanted) => ({
+        status: window.tombolo.orders.find((order) => order.id === wanted).status,
+        rows: [...document.querySelectorAll(`#pending [data-order="${wanted}"]`)].map((row) => ({ status: row.dataset.status, text: row.innerText })),
+      }), id);
+      check(rows.length === 1 && rows[0].status === status && said.test(rows[0].text), `the order is ${status}, its rows say ${JSON.stringify(rows)}`);
+      return page.locator(`#pending [data-order="${id}"]`);
     };
     await rests(true);
     await page.selectOption("#action", "translate");
     await first.field("by y").fill("0.02");
-    await scheduled(20, 100);
+    await first.scheduled(20, 100);
     await told();
     await page.click("#apply");
     await first.until("the order planned", (now) => own(now).some(({ status }) => status === "accepted" || status === "computing"));
@@ -226,7 +223,7 @@ const steps = [
     await listed("Throat: height × 0.7", "Throat: moved by 0.02 along y");
     check((await given(() => page.click("#undo"))).status === "applied", "it cannot be taken back");
     await first.until("the pinch alone", (now) => now.stack.length === 1);
-    await scheduled(2, 1);
+    await first.scheduled(2, 1);
   }],
   ["the first of two edits is changed, and the second follows", async () => {
     await page.selectOption("#action", "translate");
