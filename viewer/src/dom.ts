@@ -43,6 +43,9 @@ const TEXT = `textarea, input${NO_TEXT}, [contenteditable]:not([contenteditable=
 /** The field in which somebody types whose key this is, the editor of pipelines among them; null where the key is no text. */
 export const textField = (target: EventTarget | null): HTMLElement | null => (target as HTMLElement | null)?.closest?.<HTMLElement>(TEXT) ?? null;
 
+/** Whether a sheet lies over the page, for which all keys are then meant, wherever the focus is. */
+export const isSheetOpen = (): boolean => document.querySelector("dialog[open]") !== null;
+
 /** A label that is unique in the page. */
 let count = 0;
 export const identifier = (stem: string): string => `${stem}-${++count}`;

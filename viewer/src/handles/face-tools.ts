@@ -3,7 +3,7 @@
  * is chosen is the `region` of the edit in the form.
  */
 import type { Json, Vector } from "../connection/protocol";
-import { element, identifier, textField } from "../dom";
+import { element, identifier, isSheetOpen, textField } from "../dom";
 import { readNumber } from "../number";
 import type { ShownPoints } from "../preview/previewer";
 import type { Action } from "../store/actions";
@@ -83,7 +83,7 @@ export class FaceTools implements ShapeRegion {
     stage.addEventListener("pointerdown", (event) => this.down(event), true);
     stage.addEventListener("pointermove", (event) => this.move(event), true);
     for (const kind of ["pointerup", "pointercancel"] as const) stage.addEventListener(kind, (event) => this.up(event), true);
-    window.addEventListener("keydown", (event) => this.key(event), true);
+    window.addEventListener("keydown", (event) => this.key(event));
     store.watch((state) => bodyOf(state.draft).region, () => this.follow());
     this.sayTool();
   }
@@ -199,11 +199,12 @@ export class FaceTools implements ShapeRegion {
   }
 
   private key(event: KeyboardEvent): void {
-    if (event.key !== "Escape" || !this.tool) return;
+    // What has done something with the key already was meant by it, such as a row that is dragged.
+    if (event.key !== "Escape" || event.defaultPrevented || !this.tool || isSheetOpen()) return;
     // What somebody types elsewhere is left with the key.
     const field = textField(event.target);
     if (field && !this.stroke && !this.bar.contains(field)) return;
-    event.stopPropagation();
+    event.preventDefault();
     if (this.stroke) this.giveUp();
     else this.show(false);
   }

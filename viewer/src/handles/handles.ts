@@ -3,7 +3,7 @@
  * composes the edit in the form; the preview and the forecast follow from there.
  */
 import type { Vector } from "../connection/protocol";
-import { textField } from "../dom";
+import { isSheetOpen, textField } from "../dom";
 import { showTip } from "../picture/overlay";
 import type { Action } from "../store/actions";
 import type { Bones } from "../picture/skeleton";
@@ -329,8 +329,8 @@ export class Handles {
     if (event.key === "Control" || event.key === "Meta" || event.key === "Shift") return this.modified(event);
     if (gesture.hasMoved && !this.press && event.key.toLowerCase() === "z" && (event.ctrlKey || event.metaKey)) return this.close();
     const target = event.target as HTMLElement | null;
-    const isElsewhere = !this.box.isFocused && (textField(target) ?? target?.closest?.("input, select, button, summary"));
-    if (isElsewhere && !this.press) return;
+    const isElsewhere = !this.box.isFocused && (textField(target) ?? target?.closest?.('input, select, button, summary, [role="slider"]'));
+    if ((isElsewhere || isSheetOpen()) && !this.press) return;
     const axis = ["x", "y", "z"].indexOf(event.key.toLowerCase());
     if (event.key === "Escape") this.abort();
     else if (event.key === "Enter") this.finish();
@@ -354,7 +354,10 @@ export class Handles {
 
   /** A gesture by the keyboard alone: its axis and its number are typed. */
   private start(event: KeyboardEvent): void {
-    if (event.key === "Escape" && event.target === this.scene && this.grippable.release()) return this.drawn();
+    if (event.key === "Escape" && event.target === this.scene && this.grippable.release()) {
+      event.preventDefault();
+      return this.drawn();
+    }
     const kind = STARTS[event.key];
     const target = this.target();
     if (!kind || !target || event.ctrlKey || event.metaKey || event.altKey || event.target !== this.scene) return;

@@ -2,7 +2,7 @@
  * The tools that take the next click or tap in the picture in place of features: at most one is on, and its button says so. By the keyboard
  * Enter takes the middle of the picture, to which the camera brings what one likes; Escape leaves the tool.
  */
-import { part, textField, write } from "../dom";
+import { isSheetOpen, part, textField, write } from "../dom";
 import { showTip } from "../picture/overlay";
 
 const NOTHING_THERE = "Nothing lies in the middle of the picture: turn or move it there.";
@@ -43,7 +43,7 @@ export class ClickTools {
     });
     window.addEventListener("keydown", (event) => {
       const { current } = this;
-      if (event.key !== "Escape" || event.defaultPrevented || !current || textField(event.target)) return;
+      if (event.key !== "Escape" || event.defaultPrevented || !current || textField(event.target) || isSheetOpen()) return;
       event.preventDefault();
       this.use(current.button);
     });

@@ -14,6 +14,7 @@ export function watchDrawers(): (target: HTMLElement) => void {
     part(`${side}-drawer`).addEventListener("click", () => open(document.body.dataset.drawer === side ? null : side));
     part(side).addEventListener("keydown", (event) => {
       if (event.key !== "Escape" || (document.body.dataset.drawer ?? "") === "" || event.defaultPrevented) return;
+      event.preventDefault();
       open(null);
       part(`${side}-drawer`).focus();
     });

@@ -35,7 +35,7 @@ describe("choosing faces", () => {
   const region = (): Json | undefined => bodyOf(made.store.state.draft).region;
   const faces = (): number[] => (region() as { faces?: number[] } | null)?.faces ?? [];
   const sidesOf = (found: readonly number[]): number[] => [...new Set(found.map((face) => sides[face]!))].sort((a, b) => a - b);
-  const escape = (target: EventTarget = scene): boolean => target.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape", bubbles: true }));
+  const escape = (target: EventTarget = scene): boolean => target.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape", bubbles: true, cancelable: true }));
   /** The middle of the side +z, and the corners of a square around it. */
   const middle = OBLIQUE.toPicture([0, 0, 1])!;
   const around = (size: number): Place[] => [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([x, y]) => [middle[0] + x! * size, middle[1] + y! * size]);
@@ -215,6 +215,22 @@ describe("choosing faces", () => {
       finger("pointerup", to, 1);
       expect([heard, faces().length > 0]).toEqual([[], true]);
     });
+  });
+
+  it("leave an Escape alone that something else has taken, or that closes a sheet", () => {
+    document.getElementById("faces")!.click();
+    const isShown = (): boolean => !document.querySelector<HTMLElement>('[aria-label="Choosing faces"]')!.hidden;
+    const sheet = document.getElementById("keys")!;
+    sheet.setAttribute("open", "");
+    escape(document.body);
+    sheet.removeAttribute("open");
+    // As a row that is dragged does, later than this was made.
+    const taken = new AbortController();
+    window.addEventListener("keydown", (event) => event.preventDefault(), { capture: true, signal: taken.signal });
+    escape();
+    taken.abort();
+    expect(isShown()).toBe(true);
+    expect([escape(), isShown()]).toEqual([false, false]);
   });
 
   it("looks at all triangles once for each shape and each place to look from, however often one presses", () => {

@@ -146,6 +146,19 @@ describe("shaping by hand", () => {
       expect([moved(), document.activeElement]).toEqual([[0, 3, 0], scene]);
     });
 
+    it("leaves keys to what has the focus elsewhere while a number can be typed, and to a sheet that lies over the page", () => {
+      key("g");
+      const plot = document.createElement("div");
+      plot.setAttribute("role", "slider");
+      document.body.append(plot);
+      for (const name of ["0", "-", "x", "Escape"]) expect(key(name, plot), name).toBe(true);
+      const sheet = document.getElementById("keys")!;
+      sheet.setAttribute("open", "");
+      expect([key("Escape", document.body), box().closest("label")!.hidden]).toEqual([true, false]);
+      sheet.removeAttribute("open");
+      expect([key("Escape"), box().closest("label")!.hidden]).toEqual([false, true]);
+    });
+
     it("leaves both fingers to the camera where a second one comes before the first has dragged anything", () => {
       finger("pointerdown", arrow(), 1);
       expect(camera).toEqual([]);
@@ -213,8 +226,8 @@ describe("shaping by hand", () => {
         point("pointerup", nodes()[at]!, { shiftKey: true });
       }
       expect(meant()).toBe(2);
-      key("Escape");
-      expect(meant()).toBe(0);
+      // It is for nothing else then, and the next one is.
+      expect([key("Escape"), meant(), key("Escape")]).toEqual([false, 0, true]);
     });
 
     it("means the nodes of before where a second finger says that the camera was meant", () => {

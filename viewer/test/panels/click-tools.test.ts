@@ -61,6 +61,9 @@ describe("the tools that take clicks", () => {
     document.getElementById("pin")!.click();
     escape(document.getElementById("note-text")!);
     expect(pressed()).toEqual(["pin"]);
+    document.getElementById("keys")!.setAttribute("open", "");
+    expect([escape(document.body).defaultPrevented, pressed()]).toEqual([false, ["pin"]]);
+    document.getElementById("keys")!.removeAttribute("open");
     expect([escape().defaultPrevented, pressed(), tools.current]).toEqual([true, [], null]);
   });
 });

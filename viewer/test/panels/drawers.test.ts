@@ -32,8 +32,8 @@ describe("the drawers of a narrow page", () => {
   it("are closed with Escape, which gives the focus back to the button", () => {
     at("right-drawer").click();
     at("amount").focus();
-    escape(at("amount"));
-    expect([shown(), document.activeElement]).toEqual([["", "false", "false"], at("right-drawer")]);
+    const { defaultPrevented } = escape(at("amount"));
+    expect([shown(), document.activeElement, defaultPrevented]).toEqual([["", "false", "false"], at("right-drawer"), true]);
   });
 
   it("leave an Escape alone that something in them has taken, or that comes while both are closed", () => {
