@@ -13,11 +13,21 @@ export function middleOf(element: HTMLElement): [number, number] {
   return [left + width / 2, top + height / 2];
 }
 
+/** Does something at the next that the person does: that turns the picture, takes another tool, or leaves it. */
+function untilNext(action: () => void): void {
+  const heard = new AbortController();
+  for (const kind of ["keydown", "pointerdown", "wheel"]) window.addEventListener(kind, () => {
+    heard.abort();
+    action();
+  }, { capture: true, passive: true, signal: heard.signal });
+}
+
 /** Takes the place in the middle of the picture, and says so where nothing is there. */
 export function takeMiddle(picture: HTMLElement, take: (clientX: number, clientY: number) => boolean): void {
   const [x, y] = middleOf(picture);
   const hasMet = take(x, y);
   showTip(hasMet ? null : NOTHING_THERE, x, y);
+  if (!hasMet) untilNext(() => { if (part("tip").textContent === NOTHING_THERE) showTip(null, 0, 0); });
   // Said anew each time.
   write(part("announcer"), "");
   if (!hasMet) write(part("announcer"), NOTHING_THERE);
@@ -56,8 +66,11 @@ export class ClickTools {
 
   /** Switches the tool of a button on or off; the others are off. */
   use(button: string): void {
-    for (const tool of this.tools) if (tool.button !== button && tool.isOn()) tool.toggle();
-    this.tools.find((tool) => tool.button === button)?.toggle();
+    const wanted = this.tools.find((tool) => tool.button === button);
+    // A key asks also for what its button does not offer now.
+    if ((part(button) as HTMLButtonElement).disabled && !wanted?.isOn()) return;
+    for (const tool of this.tools) if (tool !== wanted && tool.isOn()) tool.toggle();
+    wanted?.toggle();
     this.show();
   }
 

@@ -39,6 +39,20 @@ describe("the tools that take clicks", () => {
     expect(tools.taking()).toBeNull();
   });
 
+  it("stay as they are where a key asks for one that is not offered", () => {
+    tools.use("ruler");
+    const button = document.getElementById("pin") as HTMLButtonElement;
+    button.disabled = true;
+    tools.use("pin");
+    expect(pressed()).toEqual(["ruler"]);
+    // One that is on can be left all the same.
+    button.disabled = false;
+    tools.use("pin");
+    button.disabled = true;
+    tools.use("pin");
+    expect(pressed()).toEqual([]);
+  });
+
   it("take the middle of the picture with Enter, where the focus is there", () => {
     const scene = document.getElementById("scene")!;
     const enter = (): KeyboardEvent => {
@@ -50,7 +64,19 @@ describe("the tools that take clicks", () => {
     expect(enter().defaultPrevented).toBe(false);
     tools.use("pin");
     expect([enter().defaultPrevented, taken, pressed()]).toEqual([true, [], ["pin"]]);
-    expect(document.getElementById("tip")!.textContent).toBe("Nothing lies in the middle of the picture: turn or move it there.");
+    const tip = document.getElementById("tip")!;
+    expect([tip.textContent, tip.hidden]).toEqual(["Nothing lies in the middle of the picture: turn or move it there.", false]);
+    // Whatever is done next, it is not said any more.
+    for (const next of [new KeyboardEvent("keydown", { key: "ArrowLeft", bubbles: true }), new PointerEvent("pointerdown", { bubbles: true }), new WheelEvent("wheel", { bubbles: true })]) {
+      enter();
+      expect(tip.hidden).toBe(false);
+      scene.dispatchEvent(next);
+      expect(tip.hidden, next.type).toBe(true);
+    }
+    enter();
+    tip.textContent = "wall";
+    scene.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true }));
+    expect(tip.hidden).toBe(false);
     scene.getBoundingClientRect = () => new DOMRect(100, 50, 600, 400);
     enter();
     expect([taken, pressed(), document.getElementById("tip")!.hidden]).toEqual([[400], [], true]);
