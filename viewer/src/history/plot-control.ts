@@ -105,6 +105,8 @@ export function watchPlot(root: HTMLElement, area: () => Area | null, plot: Cont
     // The mouse that browsers play after a finger would mark a part of the plot.
     event.preventDefault();
     root.focus({ preventScroll: true });
+    // What is under the finger may be drawn anew, and would then not tell that it is lifted.
+    root.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, at);
     away = fingers.size === 1 && isAway(area()!, plot.cursor(), event) ? event : null;
     if (fingers.size === 1 && !away) plot.point(at);

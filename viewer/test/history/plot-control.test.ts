@@ -24,6 +24,7 @@ describe("the part of an axis that is shown", () => {
 
 describe("keys and fingers on a plot", () => {
   let asked: unknown[];
+  let captured: number[];
   let root: HTMLElement;
   let cursor: number | null;
   const send = (kind: string, pointerId: number, x: number, pointerType = "touch", y = 30): boolean =>
@@ -31,6 +32,8 @@ describe("keys and fingers on a plot", () => {
   beforeEach(() => {
     [asked, cursor] = [[], null];
     root = document.createElement("div");
+    root.setPointerCapture = (pointer) => { captured.push(pointer); };
+    captured = [];
     watchPlot(root, () => ({ left: 100, top: 10, width: 200, height: 50 }), {
       zoomBy: (factor) => asked.push(factor), whole: () => asked.push("whole"), cursor: () => cursor, release: () => asked.push("release"), step: (by) => asked.push(by), point: (at) => asked.push(["point", at]),
       pinchBegun: () => asked.push("begun"), pinch: (from, to) => asked.push(["pinch", from, to]),
@@ -52,9 +55,9 @@ describe("keys and fingers on a plot", () => {
     expect(send("pointerdown", 1, 150)).toBe(false);
     send("pointerup", 1, 150);
     send("pointermove", 1, 170);
-    expect(asked).toEqual([["point", 0.25]]);
+    expect([asked, captured]).toEqual([[["point", 0.25]], [1]]);
     expect(send("pointerdown", 2, 150, "mouse")).toBe(true);
-    expect(asked.length).toBe(1);
+    expect([asked.length, captured]).toEqual([1, [1]]);
   });
 
   it("take the cursor away by a tap on its line or beside the plot, and by nothing else", () => {

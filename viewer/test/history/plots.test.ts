@@ -247,6 +247,7 @@ describe("the plots below the picture", () => {
       area.className = "u-over";
       area.getBoundingClientRect = () => ({ left: 0, top: 0, width: 400, height: 100 }) as DOMRect;
       canvas().append(area);
+      canvas().setPointerCapture = () => undefined;
       const finger = (kind: string, pointerId: number, x: number): void => void area.dispatchEvent(new PointerEvent(kind, { bubbles: true, cancelable: true, pointerId, pointerType: "touch", clientX: x }));
       finger("pointerdown", 1, 175);
       finger("pointerup", 1, 175);
