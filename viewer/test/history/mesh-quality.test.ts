@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import type { Json } from "../../src/connection/protocol";
 import { MESH, SMALLEST, takeQuality } from "../../src/history/mesh-quality";
 import { History, TIMES, firstChoice, seriesKey } from "../../src/history/series";
 import { STATUS } from "../page";
@@ -25,6 +26,18 @@ describe("the quality of the mesh", () => {
     takeQuality(history, [], status(1, 0.25));
     history.add("health", 2, 0.2, { "quality.min": 0.3 });
     expect(firstChoice(history.series)).toEqual([seriesKey("health", "quality.min")]);
+  });
+
+  it("is not left to a monitor of a part of the mesh", () => {
+    const monitors = [{ pipeline: "warm", name: "quality.min" }];
+    const stages: Json[] = [{ threshold: { field: "heat", above: 1 } }, { quality: {} }];
+    const takes = (name: string, of: Json[]): boolean => takeQuality(new History(), monitors, status(1, 0.25), [{ name, stages: of }]);
+    expect(takes("warm", stages)).toBe(true);
+    // What comes behind it changes nothing, nor what another pipeline takes out.
+    expect([takes("warm", stages.toReversed()), takes("other", stages)]).toEqual([false, false]);
+    // Beside such a one there is one of the whole.
+    const both = [...monitors, { pipeline: "health", name: "quality.min" }];
+    expect(takeQuality(new History(), both, status(1, 0.25), [{ name: "warm", stages }, { name: "health", stages: [{ quality: {} }] }])).toBe(false);
   });
 
   it("takes no place from monitors that nobody knows by name", () => {
