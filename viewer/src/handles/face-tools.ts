@@ -11,6 +11,7 @@ import { bodyOf, chosen, kindOf } from "../store/draft";
 import type { State } from "../store/state";
 import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
+import { giveToCamera, isForCamera } from "./camera-press";
 import { boxRegionOf, combined, grown, meantBy, neighboursOf, pointsOf, regionOf } from "./face-choice";
 import type { Mode } from "./face-choice";
 import { contains, distance, reachOf } from "./gizmo";
@@ -41,8 +42,6 @@ let strokes = 0;
 export class FaceTools implements ShapeRegion {
   private tool: Tool | null = null;
   private stroke: Stroke | null = null;
-  /** The finger whose stroke was given up for the camera, while it is down. */
-  private handedOver: number | null = null;
   private surface: ShownPoints | null = null;
   private neighbours: Int32Array | null = null;
   private meant: { region: Json; faces: ReadonlySet<number>; points: ReadonlySet<number> } | null = null;
@@ -147,7 +146,7 @@ export class FaceTools implements ShapeRegion {
   private down(event: PointerEvent): void {
     if (!this.tool || !this.scene.contains(event.target as Node)) return;
     // The other buttons are the camera's.
-    if (event.button !== 0 || event.pointerId === this.handedOver) return;
+    if (event.button !== 0 || isForCamera(event)) return;
     // A finger beside another one is the camera's, as the first is.
     if (event.pointerType === "touch" && !event.isPrimary && (!this.stroke || this.handOver(this.stroke))) return;
     event.stopImmediatePropagation();
@@ -165,8 +164,7 @@ export class FaceTools implements ShapeRegion {
     const isFar = path.some((place) => distance(place, path[0]!) > reachOf(down.pointerType));
     if (down.pointerType !== "touch" || isFar) return false;
     this.giveUp();
-    this.handedOver = down.pointerId;
-    down.target?.dispatchEvent(new PointerEvent(down.type, down));
+    giveToCamera(down);
     return true;
   }
 
@@ -189,7 +187,6 @@ export class FaceTools implements ShapeRegion {
 
   private up(event: PointerEvent): void {
     const { stroke } = this;
-    if (event.pointerId === this.handedOver) this.handedOver = null;
     if (!stroke || event.pointerId !== stroke.down.pointerId) return;
     event.stopImmediatePropagation();
     if (event.type !== "pointerup") return this.giveUp();

@@ -11,6 +11,7 @@ import type { Selection } from "../store/selection";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 import { BendTool } from "./bend-tool";
+import { giveToCamera, isForCamera } from "./camera-press";
 import { Gesture, amountText } from "./gesture";
 import type { Composer } from "./gesture";
 import { distance, gizmoShapes, partAt, reachOf, samePart } from "./gizmo";
@@ -65,7 +66,6 @@ export class Handles {
   private gesture: Gesture | null = null;
   /** The pointer that is down; null while a gesture rests and its number can be typed. */
   private press: Press | null = null;
-  private isHandingOver = false;
   private cursor: Place = [0, 0];
   private unit = "";
 
@@ -153,7 +153,7 @@ export class Handles {
 
   private down(event: PointerEvent): void {
     if (this.box.root.contains(event.target as Node)) return;
-    if (this.isHandingOver) return;
+    if (isForCamera(event)) return;
     if (this.press) {
       if (this.press.click && event.pointerType === "touch" && this.press.down.pointerType === "touch") return this.handOver(this.press);
       // Another finger has nothing to say while one drags.
@@ -185,9 +185,7 @@ export class Handles {
     this.press = null;
     this.close();
     this.grippable.mean(press.nodes);
-    this.isHandingOver = true;
-    press.down.target?.dispatchEvent(new PointerEvent(press.down.type, press.down));
-    this.isHandingOver = false;
+    giveToCamera(press.down);
   }
 
   /** Begins what a press at a place is meant for; null where it is meant for the camera. */

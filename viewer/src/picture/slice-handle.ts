@@ -1,5 +1,6 @@
 /** The slice of the chosen view as something to drag: along its normal, in the picture. The panel beside it does the same by number and key. */
 import type { Vector } from "../connection/protocol";
+import { giveToCamera } from "../handles/camera-press";
 import { closestAlong } from "../handles/projection";
 import type { Projection } from "../handles/projection";
 import { reachOf } from "../handles/gizmo";
@@ -35,7 +36,8 @@ export class SliceHandle {
   private readonly halo = svg("circle", { class: "halo", r: String(reachOf("touch")) });
   private readonly grip = svg("g", { class: "grip" });
   private readonly title = svg("title");
-  private drag: { pointer: number; plane: Plane; from: number; start: number; offset: number } | null = null;
+  /** `down` is the event that began it. */
+  private drag: { down: PointerEvent; plane: Plane; from: number; start: number; offset: number } | null = null;
 
   constructor(root: SVGElement, private readonly scene: HTMLElement, private readonly picture: SlicePicture, private readonly slice: Sliced) {
     this.title.textContent = "Drag the slice along its normal";
@@ -44,6 +46,8 @@ export class SliceHandle {
     this.grip.addEventListener("pointerdown", (event) => this.down(event));
     this.grip.addEventListener("pointermove", (event) => this.move(event));
     for (const kind of ["pointerup", "pointercancel"] as const) this.grip.addEventListener(kind, (event) => this.up(event));
+    // Before the camera sees it.
+    scene.addEventListener("pointerdown", (event) => { if (this.drag && !this.handOver(event, this.drag)) event.stopPropagation(); }, true);
   }
 
   /** The place of the page at which it can be gripped; null where there is none. */
@@ -87,20 +91,33 @@ export class SliceHandle {
   }
 
   private down(event: PointerEvent): void {
+    if (this.drag) {
+      if (this.handOver(event, this.drag)) giveToCamera(event, this.scene);
+      return;
+    }
     const plane = this.slice.movable;
-    if (!plane || event.button !== 0 || this.drag) return;
+    if (!plane || event.button !== 0) return;
     const start = this.along(event, plane);
     if (start === null) return;
     event.preventDefault();
     event.stopPropagation();
     this.grip.setPointerCapture(event.pointerId);
     const from = offsetOf(plane);
-    this.drag = { pointer: event.pointerId, plane, from, start, offset: from };
+    this.drag = { down: event, plane, from, start, offset: from };
+  }
+
+  /** A second finger has come: as long as the first has moved nothing, both are meant for the camera, which has not seen the first. */
+  private handOver(second: PointerEvent, { down, from, offset }: NonNullable<typeof this.drag>): boolean {
+    if (second.pointerType !== "touch" || down.pointerType !== "touch" || offset !== from) return false;
+    this.drag = null;
+    giveToCamera(down, this.scene);
+    this.picture.redraw();
+    return true;
   }
 
   private move(event: PointerEvent): void {
     const { drag } = this;
-    if (!drag || drag.pointer !== event.pointerId) return;
+    if (!drag || drag.down.pointerId !== event.pointerId) return;
     event.stopPropagation();
     const now = this.along(event, drag.plane);
     const box = this.picture.bounds();
@@ -116,7 +133,7 @@ export class SliceHandle {
   }
 
   private up(event: PointerEvent): void {
-    if (this.drag?.pointer !== event.pointerId) return;
+    if (this.drag?.down.pointerId !== event.pointerId) return;
     event.stopPropagation();
     this.drag = null;
     this.picture.redraw();

@@ -56,6 +56,38 @@ describe("the knob of a slice", () => {
     expect(move).toHaveBeenCalledOnce();
   });
 
+  it("leaves both fingers to the camera where a second one comes before the first has moved it, wherever that is put down", () => {
+    const [root, scene] = [document.createElementNS("http://www.w3.org/2000/svg", "svg"), document.createElement("div")];
+    const plane: Plane = { origin: [1, 0.5, 0.2], normal: [0, 0, 2] };
+    const move = vi.fn();
+    const handle = new SliceHandle(root, scene, { projection: () => OBLIQUE, points: () => Float32Array.of(0, 0, 0.2, 2, 1, 0.2), bounds: () => BOX, redraw: () => undefined }, { movable: plane, move });
+    handle.drawn();
+    const grip = root.querySelector<SVGElement>(".grip")!;
+    grip.setPointerCapture = () => undefined;
+    let seen: number[] = [];
+    scene.addEventListener("pointerdown", ({ pointerId }) => seen.push(pointerId));
+    const send = (kind: string, pointerId: number, up = 0, target: Element = grip): void => {
+      const [x, y] = handle.place!;
+      target.dispatchEvent(new PointerEvent(kind, { bubbles: true, button: 0, pointerId, pointerType: "touch", clientX: x, clientY: y - up }));
+    };
+    for (const second of [scene, grip]) {
+      seen = [];
+      send("pointerdown", 1);
+      send("pointerdown", 2, 0, second);
+      expect(seen).toEqual([1, 2]);
+      send("pointermove", 1, 40);
+      send("pointerup", 1, 40);
+      expect(move).not.toHaveBeenCalled();
+    }
+    // A slice that goes with a finger is kept from another one.
+    seen = [];
+    send("pointerdown", 1);
+    send("pointermove", 1, 40);
+    send("pointerdown", 2, 0, scene);
+    send("pointermove", 1, 60);
+    expect([seen, move.mock.calls.length]).toEqual([[], 2]);
+  });
+
   it("stands at the plane that it moves, though others are cut with it", () => {
     const root = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     const plane: Plane = { origin: [1, 0.5, 0.2], normal: [0, 0, 1] };
