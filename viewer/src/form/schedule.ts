@@ -1,6 +1,6 @@
 /** A schedule as people see it: in one sentence, and how far the shape is on its way over the steps as a curve. */
 import type { Json } from "../connection/protocol";
-import { element, write } from "../dom";
+import { element, svg, write } from "../dom";
 import { digits } from "../number";
 import { isObject } from "../store/draft";
 
@@ -42,19 +42,16 @@ export function scheduleCurve(schedule: Json | undefined): Curve | null {
   return { points, label: `The shape ${how}${isInJumps ? ", in jumps" : ""}` };
 }
 
-const SVG = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT] = [36, 14];
 
 /** The sentence and the curve, in the head of what unfolds to the schedule's fields. */
 export class ScheduleSummary {
   private readonly sentence = element("span");
-  private readonly picture = document.createElementNS(SVG, "svg");
-  private readonly line = document.createElementNS(SVG, "polyline");
+  private readonly picture = svg("svg", { role: "img", viewBox: `-1 -1 ${WIDTH + 2} ${HEIGHT + 2}` });
+  private readonly line = svg("polyline");
   readonly root = element("summary", {}, this.sentence, this.picture);
 
   constructor() {
-    this.picture.setAttribute("role", "img");
-    this.picture.setAttribute("viewBox", `-1 -1 ${WIDTH + 2} ${HEIGHT + 2}`);
     this.picture.append(this.line);
   }
 

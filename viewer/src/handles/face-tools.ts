@@ -3,7 +3,7 @@
  * is chosen is the `region` of the edit in the form.
  */
 import type { Json, Vector } from "../connection/protocol";
-import { element, identifier, isSheetOpen, textField } from "../dom";
+import { element, identifier, isSheetOpen, svg, textField } from "../dom";
 import { readNumber } from "../number";
 import type { ShownPoints } from "../preview/previewer";
 import type { Action } from "../store/actions";
@@ -17,7 +17,6 @@ import type { Mode } from "./face-choice";
 import { contains, distance, reachOf } from "./gizmo";
 import { boxOf } from "./handle-box";
 import type { ShapeRegion } from "./shape-target";
-import { svg } from "./overlay";
 import type { Place, Projection } from "./projection";
 import { VisibleFaces } from "./visible-faces";
 

@@ -1,16 +1,10 @@
 /** What is drawn over the picture while a shape is shaped by hand: the parts that can be gripped, and the number at the cursor. */
 import "./handles.css";
-import { element } from "../dom";
+import { element, svg } from "../dom";
 import type { GizmoPart, Shape } from "./gizmo";
 import { samePart } from "./gizmo";
 import { AXIS_NAMES } from "./vector";
 import type { Place } from "./projection";
-
-export function svg<K extends keyof SVGElementTagNameMap>(tag: K, attributes: Record<string, string> = {}): SVGElementTagNameMap[K] {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
 
 const written = (line: readonly Place[], end: string): string => line.length === 0 ? ""
   : `M${line.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join("L")}${end}`;

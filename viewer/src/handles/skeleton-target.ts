@@ -1,5 +1,6 @@
 /** The control nodes of the skeleton as something to grip: dragged, several at once, or turned about one of them. */
 import type { Json, Vector } from "../connection/protocol";
+import { svg } from "../dom";
 import type { Bones } from "../picture/skeleton";
 import { nearestWithin } from "../picture/skeleton";
 import type { Values } from "../form/schema";
@@ -10,7 +11,6 @@ import type { ControlNode } from "./control-nodes";
 import type { Composer } from "./gesture";
 import type { Picture, Target } from "./handles";
 import type { Amount } from "./motion";
-import { svg } from "./overlay";
 import type { Place } from "./projection";
 import { toStep } from "./rounding";
 import { lengthUnit } from "./shape-target";

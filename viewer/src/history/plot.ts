@@ -11,7 +11,7 @@ import { containing, pinched, watchPlot, within, zoomed } from "./plot-control";
 import type { Span } from "./plot-control";
 import type { Tab } from "./dock";
 import type { Comparison, History, Mark, Series } from "./series";
-import { areTold, compare, firstChoice, lastAt, valueAt } from "./series";
+import { areTold, compare, firstChoice, interpolated, lastAt } from "./series";
 import { ValueTable } from "./table";
 
 /** The most series that are drawn at once: one for each colour. */
@@ -78,7 +78,7 @@ export class HistoryPlot implements Tab {
       cursor: () => this.heldPlace, release: () => this.release(),
       point: (at) => {
         const along = this.shown[0] + at * (this.shown[1] - this.shown[0]);
-        this.hold(this.isOverTime ? valueAt(this.times, this.cycles, along) : along);
+        this.hold(this.isOverTime ? interpolated(this.times, this.cycles, along) : along);
       },
       pinchBegun: () => { this.pinchedFrom = this.shown; },
       pinch: (from, to) => this.zoomTo(within(pinched(this.pinchedFrom, from, to), this.ends)),
@@ -251,7 +251,7 @@ export class HistoryPlot implements Tab {
 
   /** Where on the axis a cycle is, of which nothing may have been said. */
   private placeOf(cycle: number): number {
-    return this.isOverTime ? valueAt(this.cycles, this.times, cycle) : cycle;
+    return this.isOverTime ? interpolated(this.cycles, this.times, cycle) : cycle;
   }
 
   private get ends(): Span {
@@ -278,7 +278,7 @@ export class HistoryPlot implements Tab {
     if (isOverTime === this.isOverTime) return;
     const before = this.along;
     this.isOverTime = isOverTime;
-    this.zoom = this.zoom && this.zoom.map((end) => valueAt(before, this.along, end)) as unknown as Span;
+    this.zoom = this.zoom && this.zoom.map((end) => interpolated(before, this.along, end)) as unknown as Span;
     [...this.axes.children].forEach((button, i) => button.setAttribute("aria-pressed", String((i === 1) === isOverTime)));
   }
 

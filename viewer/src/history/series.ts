@@ -195,7 +195,7 @@ export function areTold(cycles: readonly number[], times: readonly number[]): bo
 }
 
 /** What stands in one rising list beside a value of another: between two of them in the same proportion. */
-export function valueAt(of: readonly number[], beside: readonly number[], value: number): number {
+export function interpolated(of: readonly number[], beside: readonly number[], value: number): number {
   const row = Math.min(Math.max(lastAt(of, value), 0), Math.max(0, of.length - 2));
   const [a, b, c, d] = [of[row], of[row + 1], beside[row], beside[row + 1]];
   if (a === undefined || c === undefined) return value;

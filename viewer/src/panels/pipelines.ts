@@ -1,5 +1,5 @@
 /** The list of the run's pipelines: what each does, when, and what that costs. Whoever steers adds, changes and removes them here. */
-import { element, part, write } from "../dom";
+import { element, part, svg, write } from "../dom";
 import { textOf } from "../pipelines/pretty";
 import { TEMPLATES, freeName } from "../pipelines/templates";
 import type { TemplateRun } from "../pipelines/templates";
@@ -167,11 +167,8 @@ export class PipelinesPanel {
 
 /** Two sheets, one over the other. */
 function copySign(): SVGElement {
-  const sign = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-  for (const [name, value] of Object.entries({ viewBox: "0 0 16 16", class: "sign", "aria-hidden": "true" })) sign.setAttribute(name, value);
-  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
-  path.setAttribute("d", "M5.5 5.5h7v7h-7zM3.5 10.5v-7h7");
-  sign.append(path);
+  const sign = svg("svg", { viewBox: "0 0 16 16", class: "sign", "aria-hidden": "true" });
+  sign.append(svg("path", { d: "M5.5 5.5h7v7h-7zM3.5 10.5v-7h7" }));
   return sign;
 }
 

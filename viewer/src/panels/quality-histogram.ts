@@ -1,12 +1,11 @@
 /** The scaled Jacobian of all cells before an order and after it, as bars in the details of the forecast. */
 import type { QualitySummary } from "../connection/protocol";
-import { part, write } from "../dom";
+import { part, svg, write } from "../dom";
 import { digits } from "../number";
 import type { Action } from "../store/actions";
 import type { State } from "../store/state";
 import type { Store } from "../store/store";
 
-const SVG = "http://www.w3.org/2000/svg";
 const WIDTH = 260, HEIGHT = 60;
 
 /** One class of a histogram: the values it spans, and how many cells are in it. */
@@ -44,12 +43,12 @@ export class QualityHistogram {
     if (classes.length === 0) return;
     const most = Math.max(...classes.flatMap(({ before, after }) => [before, after]));
     const width = WIDTH / classes.length;
-    const bars = classes.flatMap(({ from, to, before, after }, i) => [["before", before], ["after", after]].map(([name, count], side) => {
-      const height = HEIGHT * barHeight(count as number, most);
-      const bar = document.createElementNS(SVG, "rect");
-      bar.setAttribute("class", name as string);
-      for (const [key, value] of Object.entries({ x: width * (i + 0.08 + 0.42 * side), y: HEIGHT - height, width: 0.42 * width, height })) bar.setAttribute(key, value.toFixed(2));
-      const title = document.createElementNS(SVG, "title");
+    const bars = classes.flatMap(({ from, to, before, after }, i) => ([["before", before], ["after", after]] as const).map(([name, count], side) => {
+      const height = HEIGHT * barHeight(count, most);
+      const bar = svg("rect", {
+        class: name, x: (width * (i + 0.08 + 0.42 * side)).toFixed(2), y: (HEIGHT - height).toFixed(2), width: (0.42 * width).toFixed(2), height: height.toFixed(2),
+      });
+      const title = svg("title");
       title.textContent = `scaled Jacobian ${digits(from, 2)} to ${digits(to, 2)}: ${before} cells before, ${after} after`;
       bar.append(title);
       return bar;

@@ -4,7 +4,7 @@ import { exactCell } from "../exact";
 import type { ExactCell } from "../exact";
 import { readNumber, whyNoNumber, words } from "../number";
 import { GREY, NO_NUMBER_TEXT, colourMap, componentNames, gradient } from "./colour";
-import { isOfOneValue, textIn, valueAt, whyNoEnds } from "./ranges";
+import { isOfOneValue, onScale, textIn, whyNoEnds } from "./ranges";
 import type { Range } from "./ranges";
 import type { Bar } from "./scene";
 
@@ -44,7 +44,7 @@ export class ScalarBars {
     shown.name(this.describe(bar));
     shown.gaps.hidden = !bar.hasGaps;
     const { logarithmic } = bar.look.range;
-    const at = (i: number): string => textIn(valueAt(bar.range, 1 - i / (TICKS - 1), logarithmic), bar.range, logarithmic);
+    const at = (i: number): string => textIn(onScale(bar.range, 1 - i / (TICKS - 1), logarithmic), bar.range, logarithmic);
     ticks.forEach((tick, i) => write(tick, isOfOneValue(bar.range) ? "" : at(i + 1)));
     ends.forEach((input, i) => {
       if (document.activeElement === input) return;

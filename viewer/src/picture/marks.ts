@@ -1,12 +1,12 @@
 /** Marks over the picture that go with places of it: pinned probes, the ruler, the worst cells, notes. */
 import type { Vector } from "../connection/protocol";
+import { svg } from "../dom";
 import { sameJson } from "../store/store";
 
 /** A mark: a point, or a line through several, and what is written beside the last; with `edges` lines that outline what is marked. */
 export interface Mark { points: readonly Vector[]; label: string; kind: "probe" | "ruler" | "cell" | "note"; edges?: readonly (readonly [Vector, Vector])[] }
 
 const RADII: Record<Mark["kind"], number> = { probe: 4, ruler: 4, cell: 9, note: 6 };
-const SVG = "http://www.w3.org/2000/svg";
 
 export class Marks {
   private readonly groups = new Map<string, readonly Mark[]>();
@@ -27,9 +27,8 @@ export class Marks {
     if (this.groups.size === 0 && !this.root.hasChildNodes()) return;
     const box = this.root.getBoundingClientRect();
     const made: SVGElement[] = [];
-    const make = (tag: string, attributes: Record<string, string | number>, text = ""): void => {
-      const element = document.createElementNS(SVG, tag);
-      for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+    const make = (tag: keyof SVGElementTagNameMap, attributes: Record<string, string | number>, text = ""): void => {
+      const element = svg(tag, attributes);
       element.textContent = text;
       made.push(element);
     };

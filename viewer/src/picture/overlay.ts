@@ -1,5 +1,5 @@
 /** What lies over the picture: axes, the name under the pointer, and the empty state. */
-import { part, write } from "../dom";
+import { part, svg, write } from "../dom";
 import type { Covered } from "./camera";
 
 const AXIS_COLOURS = ["#ff6b6b", "#6fdc7f", "#6ea8ff"];
@@ -11,14 +11,10 @@ export class Triad {
   private readonly names: SVGTextElement[] = [];
 
   constructor() {
-    const make = <K extends "line" | "text">(tag: K): SVGElementTagNameMap[K] => document.createElementNS("http://www.w3.org/2000/svg", tag);
     AXIS_NAMES.forEach((name, i) => {
-      const line = make("line");
-      line.setAttribute("stroke", AXIS_COLOURS[i]!);
-      line.setAttribute("stroke-width", "2");
-      const label = make("text");
+      const line = svg("line", { stroke: AXIS_COLOURS[i]!, "stroke-width": 2 });
+      const label = svg("text", { fill: AXIS_COLOURS[i]! });
       label.textContent = name;
-      label.setAttribute("fill", AXIS_COLOURS[i]!);
       this.lines.push(line);
       this.names.push(label);
       part("triad").append(line, label);

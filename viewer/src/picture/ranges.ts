@@ -100,6 +100,6 @@ function spread([low, high]: Range, { symmetric, logarithmic }: RangeChoice): Ra
 }
 
 /** The value at a part of the way from the low end to the high one. */
-export function valueAt([low, high]: Range, part: number, logarithmic: boolean): number {
+export function onScale([low, high]: Range, part: number, logarithmic: boolean): number {
   return logarithmic ? low * (high / low) ** part : low + (high - low) * part;
 }

@@ -1,7 +1,7 @@
 /** The picture with its scalar bars, and as a PNG. */
 import { download, element } from "../dom";
 import { GREY, NO_NUMBER_TEXT, colourMap } from "./colour";
-import { isOfOneValue, textIn, valueAt } from "./ranges";
+import { isOfOneValue, onScale, textIn } from "./ranges";
 import type { Bar } from "./scene";
 
 /** Draws the bars over a picture, in its lower right corner, on grounds of a colour. `title` names what a bar stands for. */
@@ -44,7 +44,7 @@ function paintBar(context: CanvasRenderingContext2D, bar: Bar, title: string, [l
   for (let tick = 0; tick <= 5; tick++) {
     if (tick % 5 !== 0 && isOfOneValue(bar.range)) continue;
     const { logarithmic } = bar.look.range;
-    context.fillText(textIn(valueAt(bar.range, tick / 5, logarithmic), bar.range, logarithmic), left + width + 8 * unit, top + height * (1 - tick / 5));
+    context.fillText(textIn(onScale(bar.range, tick / 5, logarithmic), bar.range, logarithmic), left + width + 8 * unit, top + height * (1 - tick / 5));
   }
   if (bar.hasGaps) {
     context.fillText(NO_NUMBER_TEXT, left + width + 8 * unit, top + height + 22 * unit);

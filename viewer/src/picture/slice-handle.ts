@@ -1,10 +1,10 @@
 /** The slice of the chosen view as something to drag: along its normal, in the picture. The panel beside it does the same by number and key. */
 import type { Vector } from "../connection/protocol";
+import { svg } from "../dom";
 import { giveToCamera } from "../handles/camera-press";
 import { closestAlong } from "../handles/projection";
 import type { Projection } from "../handles/projection";
 import { reachOf } from "../handles/gizmo";
-import { svg } from "../handles/overlay";
 import { add, across, AXES, dot, length, normalised, times } from "../handles/vector";
 import { toStep } from "../handles/rounding";
 import { atOffset, extent, offsetOf } from "../store/pipelines";

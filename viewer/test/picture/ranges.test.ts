@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Ranges, valueAt, whyNoEnds, withTyped } from "../../src/picture/ranges";
+import { Ranges, onScale, whyNoEnds, withTyped } from "../../src/picture/ranges";
 import type { Coloured, Range, RangeChoice } from "../../src/picture/ranges";
 
 const AUTO: RangeChoice = { kind: "auto", low: 0, high: 0, symmetric: false, logarithmic: false };
@@ -84,7 +84,7 @@ describe("the range of a colour map", () => {
         expect(low).toBeLessThan(high);
       }
     }
-    expect(valueAt([1, 100], 0.5, true)).toBeCloseTo(10, 12);
-    expect(valueAt([1, 3], 0.5, false)).toBe(2);
+    expect(onScale([1, 100], 0.5, true)).toBeCloseTo(10, 12);
+    expect(onScale([1, 3], 0.5, false)).toBe(2);
   });
 });
