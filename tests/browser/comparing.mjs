@@ -109,6 +109,9 @@ const steps = [
     await rests(false);
     const order = await viewer.settled(new Set());
     check(order.status === "applied", `the pinch was refused: ${order.reason}`);
+    // The orders after it are as quick as they were.
+    await viewer.scheduled(10, 2);
+    await page.click(".schedule summary");
     const { ranges, cycles } = await page.evaluate(() => ({ ranges: [...window.seen.ranges], cycles: [...window.seen.cycles] }));
     check(ranges.length === 1 && cycles.length > 1, `while the order was under way, with frames of ${cycles.length} cycles, the range was ${ranges.join(", then ") || "not seen"}`);
     await viewer.holds("another range after it", (before) => [...document.querySelectorAll(".scalar-bar input")].map((end) => end.value).join(" to ") !== before, ranges[0]);
