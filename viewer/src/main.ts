@@ -334,7 +334,7 @@ function takeMessage(message: ServerMessage): void {
   switch (message.kind) {
     case "hello": return takeHello(message.body);
     case "status":
-      if (store.state.hello?.monitors && takeQuality(monitored, store.state.hello.monitors, message.body)) {
+      if (store.state.hello?.monitors && takeQuality(monitored, store.state.hello.monitors, message.body, store.state.pipelines.known)) {
         history.update();
         dock.update();
       }
@@ -419,7 +419,7 @@ store.watch((state) => state.hello, (hello) => {
   if (hello.monitors) {
     const shown = hello.monitors.filter(({ pipeline }) => pipeline !== WORST);
     monitors.keep(shown);
-    monitored.keep([...shown.map(({ pipeline, name }) => seriesKey(pipeline, name)), ...(isMonitored(shown) ? [] : [seriesKey(MESH, SMALLEST)])]);
+    monitored.keep([...shown.map(({ pipeline, name }) => seriesKey(pipeline, name)), ...(isMonitored(shown, store.state.pipelines.known) ? [] : [seriesKey(MESH, SMALLEST)])]);
   }
   if (!store.state.form) later.run(() => void schemaLoader.want(hello));
 });
