@@ -256,7 +256,7 @@ fn small(stream: &Value, options: &[&str]) -> (Small, Run) {
 }
 
 #[test]
-fn two_people_change_a_shape() {
+fn two_people_change_a_shape_in_a_browser() {
     let _alone = alone();
     // Encrypted by the run, with a certificate that it makes.
     let (_small, mut run) = small(&json!({"tls": {}}), &[]);
