@@ -29,19 +29,19 @@ fn passes(arguments: &[&str]) {
 }
 
 #[test]
-fn the_package_passes_its_tests_and_its_examples_run() {
+fn the_tests_and_examples_of_the_package_run() {
     passes(&["-m", "pytest", "-q", "--doctest-modules", "tests", "python"]);
 }
 
 #[test]
-fn the_types_hold() {
+fn the_types_of_the_package_hold() {
     passes(&["-m", "mypy"]);
     // What is said of the library's types is so.
     passes(&["-m", "mypy.stubtest", "tombolo._native"]);
 }
 
 #[test]
-fn the_sources_are_in_order() {
+fn the_sources_of_the_package_are_in_order() {
     let sources = [".", "../../examples", "../../clients"];
     let ruff = |task: &[&str]| {
         let settings = ["--no-cache", "--config", "pyproject.toml"];
