@@ -228,7 +228,7 @@ fn an_order_that_replaces_another_has_its_place_and_a_replay_says_the_same() {
     for id in ["second", "third"] {
         viewer.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
     }
-    step(&mut solver, &mut trace);
+    // No step between them: a busy machine may have found the shapes of the second by then.
     viewer.send(&order("better", 0.05, Some("second")));
     viewer.send(&order("late", 0.3, Some("first")));
     viewer.send(&order("lost", 0.3, Some("nobody")));
