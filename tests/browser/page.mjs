@@ -219,14 +219,29 @@ export class Fingers {
   /** Where the page is narrow: has this drawer open, and no other; none without a name. */
   async drawer(side = "") {
     const open = await this.page.evaluate(() => document.body.dataset.drawer ?? "");
-    const button = this.page.locator(`#${side || open}-drawer`);
-    if (side !== open && (await button.isVisible())) await button.tap();
+    const button = `#${side || open}-drawer`;
+    if (side !== open && (await this.page.locator(button).isVisible())) await this.tap(button);
   }
 
   /** Taps an element, in the drawer that it lies in. */
   async press(selector) {
     await this.drawer(await this.page.evaluate((wanted) => document.querySelector(wanted)?.closest("#left, #right")?.id, selector));
-    await this.page.locator(selector).tap();
+    await this.tap(selector);
+  }
+
+  /** Taps an element that is in sight. On a busy machine the finger may rest for so long that nothing is clicked: it taps again then. */
+  async tap(selector) {
+    const locator = this.page.locator(selector);
+    await locator.waitFor();
+    await this.page.evaluate((wanted) => {
+      window.isTapped = false;
+      document.querySelector(wanted).addEventListener("click", () => { window.isTapped = true; }, { once: true, capture: true });
+    }, selector);
+    for (let tries = 0; tries < 4; tries++) {
+      await locator.tap();
+      if (await this.page.waitForFunction(() => window.isTapped, null, { timeout: 5000 }).catch(() => null)) return;
+    }
+    throw new Failure(`a tap on ${selector} clicks nothing`);
   }
 
   /** Writes into a field as the keyboard of a screen does: the text comes, and no keys. */
