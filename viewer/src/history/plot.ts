@@ -49,7 +49,7 @@ export class HistoryPlot implements Tab {
   private zoom: Span | null = null;
   /** What was shown when a pinch began. */
   private pinchedFrom: Span = [0, 1];
-  private readonly canvas = element("div", { class: "plot", tabindex: 0, role: "slider", "aria-label": "cursor of the history", title: "+ and − zoom, arrows move the cursor, Esc takes it away, 0 shows the whole" });
+  private readonly canvas = element("div", { class: "plot", tabindex: 0, role: "slider", "aria-label": "cursor of the history", "aria-valuemin": 0, "aria-valuemax": 0, "aria-valuenow": 0, "aria-valuetext": "no values yet", title: "+ and − zoom, arrows move the cursor, Esc takes it away, 0 shows the whole" });
   private readonly axes = element("div", { class: "axes", role: "group", "aria-label": "Plotted over" },
     ...["cycle", "time"].map((name, i) => element("button", { type: "button", class: "small", "aria-pressed": String(i === 0), onclick: () => this.plotOver(i === 1) }, name)));
   private readonly choices = element("div", { class: "choices", role: "group", "aria-label": "Monitors in the plot" });
