@@ -8,12 +8,12 @@ use crate::peer::mesh_file;
 use crate::report::{Line, Report, Target};
 use crate::viewer::{built, watched};
 
-/// The minute from which on the heap is to be flat: by then the history of the monitors has all the
-/// times that it keeps.
-const SETTLED: usize = 10;
+/// The minutes at the beginning that are passed over: until then the history of the monitors fills.
+const SETTLED: usize = 5;
 
-/// The minutes whose mean is compared: what waits to be collected differs from one to the next.
-const MEAN: usize = 3;
+/// The minutes whose median is compared: what waits to be collected differs from one to the next by
+/// some megabytes.
+const MINUTES: usize = 10;
 
 /// What `benchmarks/browser/memory.mjs` prints: bytes after each minute.
 #[derive(Deserialize)]
@@ -42,13 +42,20 @@ pub fn run() -> Result<Report<Row>, Box<dyn Error>> {
     mesh_file("channel-60k")?;
     built()?;
     let Seen { heaps, frames } = watched("nozzle", None, "memory.mjs")?;
-    let mean = |until: usize| {
-        let heaps = heaps.get(until.checked_sub(MEAN)?..until)?;
-        Some(heaps.iter().sum::<f64>() / MEAN as f64)
+    let median = |heaps: &[f64]| {
+        let mut heaps = heaps.to_vec();
+        heaps.sort_by(f64::total_cmp);
+        heaps[heaps.len() / 2]
     };
-    let grown = mean(SETTLED).zip(mean(heaps.len())).map(|(settled, last)| last - settled);
-    let name = format!("grown from minute {SETTLED} to {}, {frames} frames [bytes]", heaps.len());
-    let targets = vec![Target::at_most(name, grown.ok_or("too few minutes were watched")?, 1e6)];
+    let settled = heaps.get(SETTLED..SETTLED + MINUTES).ok_or("too few minutes were watched")?;
+    let last = &heaps[heaps.len() - MINUTES..];
+    let name = format!(
+        "heap of the last ten of {} minutes beyond that of minutes {} to {}, {frames} frames [bytes]",
+        heaps.len(),
+        SETTLED + 1,
+        SETTLED + MINUTES
+    );
+    let targets = vec![Target::at_most(name, median(last) - median(settled), 3e6)];
     let rows = (1..).zip(heaps).map(|(minutes, bytes)| Row { minutes, bytes }).collect();
     Ok(Report { rows, targets })
 }
