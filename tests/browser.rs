@@ -210,7 +210,7 @@ fn assert_page_agrees(shown: &Value, report: &Value) {
         assert_eq!(part("at cycle "), order["cycle_applied"].to_string(), "{detail}");
         let quality = &order["min_scaled_jacobian"];
         assert_shown("the quality of an order", &part("quality "), quality, 3);
-        // What was taken back was not foretold.
+        // The page had no forecast of an order that takes another one back.
         if let Some(forecast) = row["forecast"].as_str() {
             let foretold = forecast.strip_prefix("Forecast: least quality ").expect("a quality");
             let (end, now) = foretold.split_once(" (now ").expect("the quality of now");

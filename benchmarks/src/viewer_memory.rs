@@ -15,7 +15,8 @@ const SETTLED: usize = 5;
 /// some megabytes.
 const MINUTES: usize = 10;
 
-/// What `benchmarks/browser/memory.mjs` prints: bytes after each minute.
+/// The output of `benchmarks/browser/memory.mjs`: the bytes of the heap after each minute, and how many
+/// frames were shown.
 #[derive(Deserialize)]
 struct Seen {
     heaps: Vec<f64>,
