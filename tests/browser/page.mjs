@@ -229,19 +229,21 @@ export class Fingers {
     await this.tap(selector);
   }
 
-  /** Taps an element that is in sight. On a busy machine the finger may rest for so long that nothing is clicked: it taps again then. */
+  /** Taps an element that is in sight. The finger is lifted whether or not the page has answered yet: where it rests, nothing is clicked. */
   async tap(selector) {
     const locator = this.page.locator(selector);
-    await locator.waitFor();
+    await locator.tap({ trial: true });
+    const { x, y, width, height } = await locator.boundingBox();
     await this.page.evaluate((wanted) => {
       window.isTapped = false;
       document.querySelector(wanted).addEventListener("click", () => { window.isTapped = true; }, { once: true, capture: true });
     }, selector);
-    for (let tries = 0; tries < 4; tries++) {
-      await locator.tap();
-      if (await this.page.waitForFunction(() => window.isTapped, null, { timeout: 5000 }).catch(() => null)) return;
-    }
-    throw new Failure(`a tap on ${selector} clicks nothing`);
+    const session = await this.session;
+    await Promise.all([
+      session.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [{ x: x + width / 2, y: y + height / 2 }] }),
+      session.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] }),
+    ]);
+    await this.page.waitForFunction(() => window.isTapped, null, { timeout: 60000 }).catch(() => { throw new Failure(`a tap on ${selector} clicks nothing`); });
   }
 
   /** Writes into a field as the keyboard of a screen does: the text comes, and no keys. */

@@ -59,15 +59,22 @@ async function measure(...features) {
   for (const feature of features) before[feature] = await bounds(feature);
 }
 
+/** How far what is drawn may be from what is: a coordinate comes with an error of up to 1e-5 of the diagonal of its view, an extent has two. */
+async function precision() {
+  const { views } = await viewer.look();
+  return 5e-5 * Math.max(...Object.values(views).map(({ bounds: [low, high] }) => Math.hypot(...low.map((value, axis) => high[axis] - value))));
+}
 const sizes = (box) => box[0].map((low, axis) => box[1][axis] - low);
 /** Waits until the extents of a feature are those that it had, times these factors. */
 async function scaled(feature, factors) {
   const expected = sizes(before[feature]).map((size, axis) => size * factors[axis]);
-  await viewer.until(`the extents ${expected} of ${feature}`, async () => apart([sizes(await bounds(feature))], [expected]) < 1e-4 * Math.max(...expected));
+  const close = await precision();
+  await viewer.until(`the extents ${expected} of ${feature}`, async () => apart([sizes(await bounds(feature))], [expected]) < close);
 }
 /** Waits until features are where they were. */
 async function asTheyWere(...features) {
-  for (const feature of features) await viewer.until(`${feature} where it was`, async () => apart(await bounds(feature), before[feature]) < 1e-4 * Math.max(...sizes(before[feature])));
+  const close = await precision();
+  for (const feature of features) await viewer.until(`${feature} where it was`, async () => apart(await bounds(feature), before[feature]) < close);
 }
 
 /** A number of the edit that is in the form. */

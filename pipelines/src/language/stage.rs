@@ -298,7 +298,7 @@ pub struct StreamStage {
     /// By how much a field's value may differ in the viewer.
     pub error: ErrorBound,
     /// By how much a point's coordinates may differ in the viewer; `relative` is to the diagonal of
-    /// the bounding box.
+    /// the bounding box. Without it, 1e-5 of the diagonal.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub positions: Option<ErrorBound>,
 }
