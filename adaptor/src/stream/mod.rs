@@ -187,7 +187,7 @@ pub enum StreamError {
 }
 
 /// How long the end of a run waits for viewers to read that it ended.
-const END_TIME: Duration = Duration::from_secs(1);
+const END_TIME: Duration = Duration::from_secs(3);
 
 /// Threads for what would keep the others from being served.
 const BLOCKING_THREADS: usize = 2;

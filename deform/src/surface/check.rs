@@ -74,6 +74,23 @@ const CLOSED: f64 = 1.0;
 /// Where `reference` or `shape` has another length than [`Surface::points`].
 #[must_use]
 pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> SurfaceReport {
+    check_triangles(surface, reference, shape).0
+}
+
+/// The report of [`check`], and every triangle of the surface with a flaw, rising, where the report
+/// names the first faces alone.
+///
+/// The triangles are numbered as in [`Surface::triangles`]. Of triangles that intersect they are
+/// those of the pairs that are counted: see [`Intersections::more`].
+///
+/// # Panics
+/// As [`check`].
+#[must_use]
+pub fn check_triangles(
+    surface: &Surface,
+    reference: &[Vector],
+    shape: &[Vector],
+) -> (SurfaceReport, Vec<u32>) {
     for points in [reference, shape] {
         assert_eq!(
             points.len(),
@@ -81,7 +98,14 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
             "one point for each vertex of the surface"
         );
     }
-    let found = Shapes { triangles: surface.triangles(), reference, shape }.look();
+    let mut found = Shapes { triangles: surface.triangles(), reference, shape }.look();
+    let inside_out = turned_inside_out(surface.triangles(), reference, shape);
+    let mut flawed = std::mem::take(&mut found.crossing);
+    for triangles in [&found.degenerate, &found.flipped, &inside_out] {
+        flawed.extend(triangles);
+    }
+    flawed.sort_unstable();
+    flawed.dedup();
     let face = |triangle: u32| surface.triangle_faces()[triangle as usize];
     let faces = |triangles: Vec<u32>| {
         let mut faces: Vec<u32> = triangles.into_iter().map(face).collect();
@@ -105,7 +129,7 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
         let (a, b) = (face(a), face(b));
         Intersection { faces: [a.min(b), a.max(b)], position }
     });
-    SurfaceReport {
+    let report = SurfaceReport {
         degenerate: faces(found.degenerate),
         intersections: Intersections {
             count: found.count,
@@ -113,8 +137,9 @@ pub fn check(surface: &Surface, reference: &[Vector], shape: &[Vector]) -> Surfa
             first: first.collect(),
         },
         flipped: faces(found.flipped),
-        inside_out: faces(turned_inside_out(surface.triangles(), reference, shape)),
-    }
+        inside_out: faces(inside_out),
+    };
+    (report, flawed)
 }
 
 /// [`check`], for those who take a sound surface or none.
@@ -225,6 +250,8 @@ struct Found {
     more: bool,
     /// The first pairs, rising.
     intersecting: Vec<[u32; 2]>,
+    /// The triangles of all pairs that are counted, in no order and some of them often.
+    crossing: Vec<u32>,
 }
 
 /// An edge at which two triangles have newly come to lie on each other.
@@ -239,12 +266,14 @@ struct Part {
     count: usize,
     more: bool,
     intersecting: Vec<[u32; 2]>,
+    crossing: Vec<u32>,
     folds: Vec<Fold>,
 }
 
 impl Part {
     fn intersect(&mut self, pair: [u32; 2]) {
         self.count += 1;
+        self.crossing.extend(pair);
         self.intersecting.push(pair);
         if self.intersecting.len() >= 4 * NAMED {
             self.keep_first();
@@ -293,6 +322,7 @@ impl Shapes<'_> {
             found.count += part.count;
             found.more |= part.more;
             found.intersecting.extend(part.intersecting);
+            found.crossing.extend(part.crossing);
             folds.extend(part.folds);
         }
         found.intersecting.sort_unstable();

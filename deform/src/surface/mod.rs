@@ -32,7 +32,7 @@ mod triangle_pair;
 mod triangles;
 
 pub use boundary::BoundaryFaces;
-pub use check::{check, require_sound, sound_fraction};
+pub use check::{check, check_triangles, require_sound, sound_fraction};
 pub use error::SurfaceError;
 pub use extraction::Surface;
 pub use report::{

@@ -4,7 +4,7 @@ use super::*;
 use proptest::prelude::*;
 use tombolo_deform::mesh::{CellType, Cells};
 use tombolo_deform::shapes;
-use tombolo_deform::surface::{check, require_sound, sound_fraction};
+use tombolo_deform::surface::{check, check_triangles, require_sound, sound_fraction};
 
 fn torus() -> Surface {
     extract(&shapes::torus(1.0, 0.3, [40, 20]))
@@ -185,6 +185,45 @@ fn plates_that_pass_each_other_meet_where_and_when_they_should() {
     let contact = shaped(&surface, |[x, y, _]| [x, y, 0.0]);
     assert!(check(&surface, surface.points(), &contact).intersections.count > 0);
     assert!((sound_fraction(&surface, surface.points(), &contact) - 1023.0 / 1024.0).abs() < 1e-12);
+}
+
+#[test]
+fn all_triangles_with_a_flaw_are_told_where_the_report_names_the_first() {
+    let plates = two_plates(1.0);
+    let lower = plate().points().len();
+    // The lower plate is tilted through the height of the upper one, which it crosses at x = 0.45.
+    let mut shape = plates.points().to_vec();
+    for point in &mut shape[..lower] {
+        point[2] = 1.0 + (point[0] - 0.45);
+    }
+    let (report, triangles) = check_triangles(&plates, plates.points(), &shape);
+    assert_eq!(report, check(&plates, plates.points(), &shape));
+    assert!(report.intersections.count > 16 && !report.intersections.more, "{report}");
+    assert!(triangles.is_sorted_by(|a, b| a < b));
+    for (number, corners) in (0..).zip(plates.triangles()) {
+        let corners = corners.map(|vertex| vertex as usize);
+        if corners.iter().any(|&vertex| vertex >= lower) {
+            continue;
+        }
+        let span = |axis: usize| {
+            corners
+                .map(|vertex| shape[vertex][axis])
+                .into_iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)))
+        };
+        let (left, right) = span(0);
+        let crosses = left < 0.45 && 0.45 < right;
+        // The upper plate ends at some y below 0.9.
+        if !crosses || span(1).1 < 0.8 {
+            assert_eq!(
+                triangles.contains(&number),
+                crosses,
+                "triangle {number} at {left} to {right}"
+            );
+        }
+    }
+    let (report, triangles) = check_triangles(&plates, plates.points(), plates.points());
+    assert!(report.is_sound() && triangles.is_empty());
 }
 
 #[test]

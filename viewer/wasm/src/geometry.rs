@@ -36,7 +36,7 @@ pub extern "C" fn displacement(surface: u32) -> u32 {
 }
 
 /// The fault of the shape that the last [`displacement`] of a surface leads to, and the triangles
-/// at fault: those of the faces that the report names.
+/// of all faces at fault.
 #[unsafe(no_mangle)]
 pub extern "C" fn check(surface: u32) -> u32 {
     lock(&KERNEL).check(surface).into()

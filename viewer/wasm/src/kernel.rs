@@ -182,22 +182,13 @@ impl Kernel {
                 .zip(&open.displacement)
                 .map(|(point, by)| std::array::from_fn(|axis| point[axis] + by[axis]))
                 .collect();
-            let report = tombolo_deform::surface::check(surface, reference, &shape);
-            let flawed = report
-                .degenerate
-                .first
-                .iter()
-                .chain(&report.flipped.first)
-                .chain(&report.inside_out.first)
-                .map(|flaw| flaw.face);
-            let crossing = report.intersections.first.iter().flat_map(|pair| pair.faces);
-            let faces: BTreeSet<u32> = flawed.chain(crossing).collect();
-            let triangles = surface
-                .triangle_faces()
-                .iter()
-                .zip(0..)
-                .filter(|(face, _)| faces.contains(face))
-                .map(|(_, triangle)| triangle);
+            let (report, flawed) =
+                tombolo_deform::surface::check_triangles(surface, reference, &shape);
+            let faces = surface.triangle_faces();
+            let flawed: BTreeSet<u32> =
+                flawed.into_iter().map(|triangle| faces[triangle as usize]).collect();
+            let triangles =
+                faces.iter().zip(0..).filter(|(face, _)| flawed.contains(face)).map(|pair| pair.1);
             let text = if report.is_sound() { String::new() } else { report.to_string() };
             vec![Array::Text(text), Array::Numbers(triangles.collect())]
         });
