@@ -14,9 +14,9 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 
-const require = createRequire(new URL("../../viewer/package.json", import.meta.url));
-const { chromium } = require("playwright-core");
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+export { launch } from "./chromium.mjs";
+
+const axe = readFileSync(createRequire(new URL("../../viewer/package.json", import.meta.url)).resolve("axe-core/axe.min.js"), "utf8");
 
 export class Failure extends Error {}
 export const check = (holds, message) => {
@@ -33,13 +33,6 @@ export const patience = Number(process.env.TOMBOLO_SECONDS ?? 600) * 1000;
 export const screenshots = process.env.TOMBOLO_SCREENSHOTS ?? mkdtempSync(join(tmpdir(), "tombolo-browser-"));
 const gallery = process.env.TOMBOLO_GALLERY ?? fileURLToPath(new URL("../../target/gallery", import.meta.url));
 for (const directory of [screenshots, gallery]) mkdirSync(directory, { recursive: true });
-
-/** The browser; `more` are further switches of it. */
-export const launch = (...more) => chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync", ...more],
-});
 
 /** The sizes of page that a task is filmed at; the last is that of a page that is opened. */
 const SIZES = [[1920, 1080], [820, 1180], [1280, 800]];
