@@ -125,7 +125,7 @@ export function inspectionOf(
     get sliceHandle() { return sliceHandle.place; },
     picture: () => scene.picture(),
     featureBounds: (name) => scene.featureBounds(name),
-    featurePlace: (name) => scene.featurePlace(name, (x, y) => handles.isFree(x, y)),
+    featurePlace: (name) => scene.places.featurePlace(name, (x, y) => handles.isFree(x, y)),
   };
 }
 

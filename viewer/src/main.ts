@@ -177,7 +177,7 @@ new ResizeObserver(() => {
   leaveRoomFor(part("bars"), part("pictures"));
   scene.camera.refit();
 }).observe(part("bars"));
-const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.onPage(point));
+const marks = new Marks(document.querySelector<SVGElement>("#marks")!, (point) => scene.places.onPage(point));
 const ruler = new Ruler(marks);
 const line = new Ruler(marks, "line", (from, to) => {
   linePlot.take(from, to);
@@ -185,7 +185,7 @@ const line = new Ruler(marks, "line", (from, to) => {
 });
 /** Takes what lies at a place of the page into a plot; returns whether that is the model. */
 function pinAt(x: number, y: number): boolean {
-  const probe = scene.probe(x, y);
+  const probe = scene.places.probe(x, y);
   if (probe) pins.add(probe);
   return probe !== null;
 }
@@ -203,19 +203,23 @@ const clickTools = new ClickTools(part("scene"), [
   new OnePlace("pin", pinAt),
 ]);
 const overlay = new Overlay(part("stage"), part("scene").nextElementSibling);
-const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), scene, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
-const handles = new Handles(part("stage"), part("scene"), scene, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => clickTools.current !== null);
+const faces = new FaceTools(part("stage"), part("scene"), overlay.root, part("faces"), {
+  projection: () => scene.places.projection(), setChosenFaces: (points, corners) => scene.setChosenFaces(points, corners),
+}, store, (listener) => previewer.watchSurface(listener), () => scene.redraw());
+const handles = new Handles(part("stage"), part("scene"), {
+  projection: () => scene.places.projection(), pick: (x, y) => scene.places.pick(x, y), get shownBones() { return scene.shownBones; },
+}, store, selection, new ShapeTarget(() => store.state, () => scene.shown(), faces), overlay, part("tools"), () => clickTools.current !== null);
 /** The place of the model under a place of the page, in numbers that a person would write down. */
 function placeAt(x: number, y: number): Vector | null {
-  const probe = scene.probe(x, y);
-  const reading = probe && scene.read(probe);
+  const probe = scene.places.probe(x, y);
+  const reading = probe && scene.places.read(probe);
   const [low, high] = scene.bounds() ?? [[0, 0, 0], [0, 0, 0]];
   return reading && pointed(reading.point, Math.hypot(...low.map((from, k) => high[k]! - from)));
 }
-watchPointer(part("scene"), scene, selection, {
+watchPointer(part("scene"), scene.places, selection, {
   reading: (x, y) => {
-    const probe = scene.probe(x, y);
-    const reading = probe && scene.read(probe);
+    const probe = scene.places.probe(x, y);
+    const reading = probe && scene.places.read(probe);
     return reading ? readingText(reading, fieldTitle(reading.field, reading.component), unitOf(reading.field)) : "";
   },
   tool: () => clickTools.taking(),
@@ -229,7 +233,7 @@ const look = new LookPanel(part("look"), store, (view) => {
 });
 const slice = new SlicePanel(part("slice"), store, pipelines, () => scene.bounds());
 const sliceHandle = new SliceHandle(document.querySelector<SVGElement>("#cut")!, part("scene"), {
-  projection: () => scene.projection(), bounds: () => scene.bounds(), redraw: () => scene.redraw(),
+  projection: () => scene.places.projection(), bounds: () => scene.bounds(), redraw: () => scene.redraw(),
   points: () => scene.layers.get(store.state.chosenView ?? "")?.coordinates ?? new Float32Array(0),
 }, slice);
 const earlier: Earlier = new Earlier(store, () => [...scene.layers.values()].filter(({ name }) => sentViews.has(name)), () => {
@@ -285,7 +289,7 @@ const movie = new Movie(() => scene.element, (context, picture) => paint(context
   },
   trouble: report,
 });
-const pins: Pins = new Pins(monitored, marks, scene, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key, isNew) => {
+const pins: Pins = new Pins(monitored, marks, scene.places, ({ field, component }) => ({ name: fieldTitle(field, component), unit: unitOf(field) }), (key, isNew) => {
   history.choose(key);
   if (isNew) dock.choose(history);
 }, () => sentViews.update());

@@ -1,7 +1,7 @@
 /** Picking with the pointer: hovering names a feature, a click makes it a handle, a click with shift holds it fixed. */
 import { part, write } from "../dom";
 import { showTip } from "./overlay";
-import type { Scene } from "./scene";
+import type { Places } from "./places";
 import type { Selection } from "../store/selection";
 
 const CLICK_DISTANCE = 4;
@@ -15,7 +15,7 @@ export interface PointerListener {
   tool(): ((clientX: number, clientY: number) => boolean) | null;
 }
 
-export function watchPointer(stage: HTMLElement, scene: Scene, selection: Selection, listener: PointerListener): void {
+export function watchPointer(stage: HTMLElement, places: Pick<Places, "featureAt">, selection: Selection, listener: PointerListener): void {
   /** Readers of the screen are told what is a message; what the pointer passes over would never let them rest. */
   const announcer = part("announcer");
   let down: { x: number; y: number } | null = null;
@@ -28,7 +28,7 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
   const hover = (): void => {
     scheduled = false;
     if (!last || dragging) return;
-    const feature = scene.featureAt(last.clientX, last.clientY);
+    const feature = places.featureAt(last.clientX, last.clientY);
     selection.hovered = feature;
     const role = feature ? selection.get(feature) : null;
     missed &&= listener.tool() !== null;
@@ -74,7 +74,7 @@ export function watchPointer(stage: HTMLElement, scene: Scene, selection: Select
       // A miss at once: a finger that is lifted is not there any more.
       return missed ? hover() : schedule();
     }
-    const feature = scene.featureAt(event.clientX, event.clientY);
+    const feature = places.featureAt(event.clientX, event.clientY);
     if (feature) selection.toggle(feature, event.shiftKey ? "fixed" : "handle");
     last = event;
     schedule();

@@ -1,7 +1,6 @@
 // @vitest-environment jsdom
 import { beforeEach, describe, expect, it } from "vitest";
 import { watchPointer } from "../../src/picture/pointer";
-import type { Scene } from "../../src/picture/scene";
 import { Selection } from "../../src/store/selection";
 import { page } from "../page";
 import { openDocument } from "../panels/document";
@@ -22,7 +21,7 @@ describe("a click in the picture", () => {
     scene = document.getElementById("scene")!;
     isWaiting = true;
     taken = [];
-    watchPointer(scene, { featureAt: (x: number) => (x > 100 ? "wall" : null) } as unknown as Scene, new Selection(made.store), {
+    watchPointer(scene, { featureAt: (x: number) => (x > 100 ? "wall" : null) }, new Selection(made.store), {
       reading: () => "",
       tool: () => (isWaiting ? (x) => x > 100 && taken.push(x) > 0 : null),
     });
