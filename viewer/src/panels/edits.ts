@@ -255,8 +255,10 @@ export class EditsPanel {
         part(focus).focus();
       },
     }, text);
-    const again = way("again", "Edit again", "Loads what it asked for into the form, to change it", 1, "foot");
-    const passing = order.status === "rejected" ? passingPart(order.fraction) : null;
+    const loads = asked.isBetween ? "Loads the edit that it would have added into the form, to change it; it then comes behind the others" : "Loads what it asked for into the form, to change it";
+    const again = way("again", "Edit again", loads, 1, "foot");
+    // What would pass was found for the place that the edit had among the others.
+    const passing = order.status === "rejected" && !asked.isBetween ? passingPart(order.fraction) : null;
     if (passing === null) return [again];
     return [way("part", `Apply ${percent(passing)}`, "Loads it into the form with as much of the amount as would pass", floored(passing), "apply"), again];
   }

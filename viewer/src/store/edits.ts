@@ -65,8 +65,11 @@ export function isRedoable(state: State): boolean {
 /** What an order sets beside its edits. What else it says, such as until when it may wait, was of its own time. */
 const SETTINGS = ["schedule", "deform", "guard"] as const;
 
-/** An order as the form composes it: its edit, which edit of the stack that replaces, and what is set beside. */
-export interface FormOrder { edit: Json; updating: number | null; settings: Values }
+/**
+ * An order as the form composes it: its edit, which edit of the stack that replaces, and what is set beside. `isBetween` is whether it asked
+ * for a new edit before others: the form adds it behind them.
+ */
+export interface FormOrder { edit: Json; updating: number | null; isBetween: boolean; settings: Values }
 
 /**
  * An order as the form composes it for the stack that there is now; null where it asks for something else, such as several edits or another
@@ -77,16 +80,20 @@ export function asFormOrder(order: Json | undefined, now: readonly Json[]): Form
   const { edits, stack, undo } = order;
   const settings: Values = Object.fromEntries(SETTINGS.flatMap((name) => (order[name] === undefined ? [] : [[name, order[name]]])));
   if (undo !== undefined) return null;
-  if (Array.isArray(edits) && stack === undefined) return edits.length === 1 ? { edit: edits[0]!, updating: null, settings } : null;
+  if (Array.isArray(edits) && stack === undefined) return edits.length === 1 ? { edit: edits[0]!, updating: null, isBetween: false, settings } : null;
   if (!Array.isArray(stack)) return null;
+  if (stack.length === now.length + 1) {
+    const added = stack.findIndex((edit, index) => !sameJson(edit, now[index]));
+    const isAll = now.slice(added).every((edit, index) => sameJson(edit, stack[added + 1 + index]));
+    return isAll ? { edit: stack[added]!, updating: null, isBetween: added < now.length, settings } : null;
+  }
   const others = stack.flatMap((edit, index) => (sameJson(edit, now[index]) ? [] : [{ edit, index }]));
   const [other] = others;
   if (!other || others.length > 1) return null;
   const { edit, index } = other;
-  if (index === now.length) return { edit, updating: null, settings };
   // What was taken out of the stack, or stands elsewhere in it, is no edit that was changed.
   const isMoved = now.some((known) => sameJson(known, edit));
-  return isMoved || partsOf(edit)?.key !== partsOf(now[index])?.key ? null : { edit, updating: index, settings };
+  return isMoved || partsOf(edit)?.key !== partsOf(now[index])?.key ? null : { edit, updating: index, isBetween: false, settings };
 }
 
 /** The order by which each edit of the stack came or was last changed; null where that is not known. */

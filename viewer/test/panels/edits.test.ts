@@ -271,6 +271,13 @@ describe("the list of edits", () => {
     orderOf("o2", { edits: [shift(1), shift(2)] }, 0.5);
     orderOf("o3", { undo: 1 }, null);
     expect([ways("o2"), ways("o3")]).toEqual([[], []]);
+    // One of a program or a file, with one edit more between those that there are: the form adds it behind them, which is another order.
+    orderOf("o5", { stack: [stack[0]!, shift(7), stack[1]!, stack[2]!] }, 0.5);
+    expect(ways("o5")).toEqual(["Edit again"]);
+    expect(document.querySelector<HTMLElement>('#pending [data-order="o5"] [data-act="again"]')!.title).toContain("comes behind the others");
+    press("o5", "again");
+    expect([made.store.state.draft.updating, bodyOf(made.store.state.draft).by]).toEqual([null, [7, 0, 0]]);
+    document.querySelector<HTMLElement>('#pending [data-order="o5"] [data-act="dismiss"]')!.click();
     orderOf("o4", { stack: [stack[0]!, shift(8, { muted: true }), stack[2]!] }, null);
     expect(ways("o4")).toEqual(["Edit again"]);
     press("o4", "again");

@@ -106,14 +106,20 @@ describe("an order that was refused", () => {
 
   it("is what the form composes, for the stack that there is now", () => {
     const now = [pinch(0.5), nudge(1), nudge(2)];
-    expect(asFormOrder({ edits: [nudge(9)], schedule: { steps: 3 } }, now)).toEqual({ edit: nudge(9), updating: null, settings: { schedule: { steps: 3 } } });
-    expect(asFormOrder({ stack: [pinch(0.5), nudge(9), nudge(2)] }, now)).toEqual({ edit: nudge(9), updating: 1, settings: {} });
+    expect(asFormOrder({ edits: [nudge(9)], schedule: { steps: 3 } }, now)).toEqual({ edit: nudge(9), updating: null, isBetween: false, settings: { schedule: { steps: 3 } } });
+    expect(asFormOrder({ stack: [pinch(0.5), nudge(9), nudge(2)] }, now)).toEqual({ edit: nudge(9), updating: 1, isBetween: false, settings: {} });
     // Another edit has come behind meanwhile.
-    expect(asFormOrder({ stack: [pinch(0.1)] }, now)).toEqual({ edit: pinch(0.1), updating: 0, settings: {} });
-    expect(asFormOrder({ stack: [...now, nudge(9)] }, now)).toEqual({ edit: nudge(9), updating: null, settings: {} });
+    expect(asFormOrder({ stack: [pinch(0.1)] }, now)).toEqual({ edit: pinch(0.1), updating: 0, isBetween: false, settings: {} });
+    expect(asFormOrder({ stack: [...now, nudge(9)] }, now)).toEqual({ edit: nudge(9), updating: null, isBetween: false, settings: {} });
+    // A new edit before others, also one that is there already: which of two equal ones is the new one makes no difference.
+    for (const edit of [nudge(9), nudge(1)]) expect(asFormOrder({ stack: [pinch(0.5), edit, nudge(1), nudge(2)] }, now)).toEqual({ edit, updating: null, isBetween: true, settings: {} });
+    expect(asFormOrder({ stack: [nudge(9), ...now] }, now)).toMatchObject({ edit: nudge(9), isBetween: true });
+    expect(asFormOrder({ stack: [nudge(9)] }, [])).toMatchObject({ edit: nudge(9), isBetween: false });
     const others: Json[] = [
       { undo: 1 }, { edits: [nudge(3), nudge(4)] }, { edits: [] }, { stack: now }, { stack: [] }, { stack: [pinch(0.5), nudge(2)] }, { stack: [pinch(0.5), nudge(2), nudge(1)] },
-      { stack: [pinch(0.1), nudge(9), nudge(2)] }, { stack: [nudge(9), nudge(1), nudge(2)] }, { displacement: { file: "a" } }, null, 3,
+      { stack: [pinch(0.1), nudge(9), nudge(2)] }, { stack: [nudge(9), nudge(1), nudge(2)] },
+      { stack: [nudge(9), pinch(0.5), nudge(2), nudge(1)] }, { stack: [pinch(0.1), ...now.slice(1), nudge(9)] }, { stack: [...now, nudge(8), nudge(9)] },
+      { stack: [nudge(2), pinch(0.5), nudge(1)] }, { displacement: { file: "a" } }, null, 3,
     ];
     // Which order it took the place of, and until when it might wait, was of its own time.
     const settings = { schedule: { steps: 3 }, deform: { method: "surface" }, guard: { otherwise: "clamp" } };
