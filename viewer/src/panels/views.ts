@@ -42,7 +42,8 @@ export class ViewList {
       type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
     }, name, element("small", { class: "kind" }));
     visible.setAttribute("aria-label", `${name}: shown`);
-    return element("div", { class: "view", "data-view": name }, element("label", { class: "shown" }, visible), chosen, opacity, element("small", { class: "precision", role: "status" }));
+    return element("div", { class: "view", "data-view": name }, element("label", { class: "shown" }, visible), chosen,
+      element("small", { class: "precision", role: "status" }, element("span", { "aria-hidden": "true" }), element("span", { class: "unseen" })), opacity);
   }
 
   private show(): void {
@@ -55,7 +56,11 @@ export class ViewList {
       const times = own(coarser, row.dataset.view ?? "") ?? 1;
       const precision = row.querySelector<HTMLElement>(".precision")!;
       precision.hidden = times <= 1;
-      write(precision, times <= 1 ? "" : `within ${times} times the error asked for: this page falls behind the run`);
+      // Short beside the name, so that nothing in the panel moves when it comes and goes.
+      const words = times <= 1 ? "" : `within ${times} times the error asked for: this page falls behind the run`;
+      precision.title = words;
+      write(precision.querySelector<HTMLElement>("[aria-hidden]")!, times <= 1 ? "" : `error × ${times}`);
+      write(precision.querySelector<HTMLElement>(".unseen")!, words);
       const look = own(looks, row.dataset.view ?? "");
       if (!look) continue;
       row.querySelector<HTMLInputElement>('input[type="checkbox"]')!.checked = look.visible;

@@ -4,7 +4,7 @@ import { ViewList } from "../../src/panels/views";
 import { page } from "../page";
 
 /** It may as well be the machine of the page that is slow. */
-const COARSE = "within 8 times the error asked for: this page falls behind the run";
+const COARSE = "error × 8within 8 times the error asked for: this page falls behind the run";
 
 it("says in words that a view is coarser, and nothing once it is exact again", () => {
   const { store, greet } = page({ views: [{ name: "surface", kind: "surface" }, { name: "cut", kind: "slice" }] });
