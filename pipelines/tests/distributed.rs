@@ -47,6 +47,10 @@ const PIPELINES: &str = r#"{"version": 1, "pipelines": [
         {"slice": {"origin": [1.05, 0.3, 0.4], "normal": [1, 0.2, 0.1]}}, {"quality": {}}, {"stream": {}}]},
     {"name": "along a grid plane", "every": {"steps": 1}, "stages": [
         {"slice": {"origin": [0.8, 0, 0], "normal": [1, 0, 0]}}, {"stream": {}}]},
+    {"name": "beside", "every": {"steps": 1}, "stages": [
+        {"slice": {"origin": [9, 0, 0], "normal": [1, 0, 0]}}, {"histogram": {"name": "h", "field": "speed", "range": [0, 1], "bins": 2}}, {"stream": {}}]},
+    {"name": "above", "every": {"steps": 1}, "stages": [
+        {"threshold": {"field": "speed", "min": 1e9}}, {"write": {"file": "above-{cycle}.vtu"}}]},
     {"name": "all", "every": {"steps": 1}, "stages": [{"write": {"file": "all-{cycle}.vtu"}}]},
     {"name": "health", "every": {"steps": 1}, "stages": [
         {"quality": {}}, {"statistics": {"field": "speed"}}, {"statistics": {"field": "load"}}],
@@ -58,8 +62,11 @@ fn rounded(values: &[f64]) -> Rounded {
     values.iter().map(|value| (value * 1e9).round() as i64).collect()
 }
 
-/// The cells of an extract with all that is on them, whatever the numbering.
-fn content(extract: &Extract) -> (usize, BTreeSet<(Vec<Rounded>, Rounded)>) {
+/// The number of points, the fields by name with their components, and the cells with all that is on them.
+type Content = (usize, BTreeMap<String, usize>, BTreeSet<(Vec<Rounded>, Rounded)>);
+
+/// The content of an extract, whatever the numbering.
+fn content(extract: &Extract) -> Content {
     let corner = |point: u32| {
         let mut all = extract.points[point as usize].to_vec();
         for field in extract.fields.iter().filter(|field| field.association == Association::Vertex)
@@ -78,7 +85,9 @@ fn content(extract: &Extract) -> (usize, BTreeSet<(Vec<Rounded>, Rounded)>) {
         }
         (corners, rounded(&values))
     };
-    (extract.points.len(), extract.cells.iter().enumerate().map(cell).collect())
+    let fields = extract.fields.iter().map(|field| (field.name.clone(), field.components));
+    let cells = extract.cells.iter().enumerate().map(cell);
+    (extract.points.len(), fields.collect(), cells.collect())
 }
 
 /// Extracts by the names of their pipelines, and the values of monitors.

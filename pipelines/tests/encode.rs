@@ -303,6 +303,32 @@ fn what_cannot_be_sent_is_named() {
     assert!(matches!(error, EncodeError::VolumeCell { cell: 0, .. }), "{error}");
 }
 
+/// Fields that say the same everywhere take few bytes, however many values that is.
+#[test]
+fn a_message_unfolds_to_so_many_values_and_no_more() {
+    let points = vec![[0.5; 3]; 16_000];
+    let frame = |fields: Vec<Field>| {
+        let (points, cells) = (points.clone(), Arc::new(Cells::new()));
+        let extract = Extract { points, vertices: None, cells, features: None, fields };
+        Frame { extract: Arc::new(extract), ..surface_frame(Encoding::default()) }
+    };
+    let bare = encode(&frame(Vec::new())).unwrap().with_topology();
+    let constant = field("c", Association::Vertex, 9, vec![1.0; 9 * points.len()]);
+    let one = encode(&frame(vec![constant])).unwrap().with_topology();
+    // The count of the fields is the last byte of the first message; the field stands behind it in the second.
+    let (head, of_field) = (&bare[..bare.len() - 1], &one[bare.len()..]);
+    assert_eq!((&one[..head.len()], one[head.len()]), (head, 1));
+    let of = |count: usize| {
+        let mut message = head.to_vec();
+        message.extend([(count & 0x7f) as u8 | 0x80, (count >> 7) as u8]);
+        (0..count).for_each(|_| message.extend(of_field));
+        Decoder::new().decode(&message)
+    };
+    assert_eq!(of(130).unwrap().fields.len(), 130);
+    let refused = of(1024).unwrap_err().to_string();
+    assert!(refused.contains("values, at most 134217728 are read"), "{refused}");
+}
+
 #[test]
 fn what_holds_little_is_sent_too() {
     let of = |points: Vec<Vector>, cells: Cells| {

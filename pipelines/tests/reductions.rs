@@ -7,7 +7,7 @@ use std::sync::Arc;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::Part;
 use tombolo_deform::features::FeatureSettings;
-use tombolo_deform::mesh::{FeatureSource, Mesh, Vector};
+use tombolo_deform::mesh::{FeatureSource, Mesh, MeshView, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets};
 use tombolo_deform::surface::Surface;
 use tombolo_pipelines::extract::{Association, Channel, Extract, FieldView, Snapshot};
@@ -299,6 +299,31 @@ fn a_difference_reaches_across_pipelines() {
     assert!(made.monitors["twice"].is_nan());
     let made = Case { times: &[0.0, 1.0], ..case }.everywhere(&mesh, &pipelines);
     is_near(made.monitors["twice"], 120.0, "the step after");
+}
+
+#[test]
+fn a_difference_at_the_end_is_kept_and_seen_by_those_behind_it() {
+    let mesh = plain(&box_of_tets([2, 2, 2], [0.0; 3], UPPER));
+    let pressure: Vec<f64> = mesh.points().iter().map(|[x, ..]| 100.0 - 30.0 * x).collect();
+    let fields = [FieldView::vertex("p", &pressure)];
+    let channel = Channel::new("fluid", MeshView::from(&mesh), &fields);
+    let text = r#"{"version": 1, "pipelines": [
+        {"name": "p", "stages": [{"statistics": {"field": "p"}}]},
+        {"name": "end", "on": "end", "stages": [{"difference": {"name": "range", "of": "p.max", "minus": "p.min"}}]},
+        {"name": "last", "on": "end", "stages": [{"difference": {"name": "rest", "of": "range", "minus": "p.max"}}]}]}"#;
+    let mut runner = Runner::new(&parse(text, "test.json").unwrap()).unwrap();
+    runner.run(&Snapshot { cycle: 3, time: 0.5, channels: &[channel] });
+    let outputs = runner.finish(4, 0.75);
+    assert_eq!(outputs.len(), 2, "{outputs:?}");
+    for (pipeline, expected) in [("end", 60.0), ("last", -40.0)] {
+        let history = runner.history(pipeline).expect("a history");
+        let kept: Vec<_> = history.measured().collect();
+        assert_eq!(kept.len(), 1);
+        assert_eq!((kept[0].cycle, kept[0].time), (4, 0.75));
+        is_near(kept[0].values[0], expected, pipeline);
+        let (_, cost) = runner.costs().find(|(name, _)| *name == pipeline).expect("a cost");
+        assert_eq!(cost.runs, 1);
+    }
 }
 
 #[test]

@@ -84,6 +84,36 @@ fn a_trigger_does_not_flap_and_sets_parameters() {
     );
 }
 
+/// What is not known for a while breaks what has held, and is told as such.
+#[test]
+fn a_channel_that_is_missing_is_no_value() {
+    let mut runner = runner(
+        r#"{"name": "watch", "stages": [{"statistics": {"field": "p"}}], "when": "p.max > 1", "for": {"steps": 3},
+            "then": [{"pause": {}}]}"#,
+    );
+    let mut paused = Vec::new();
+    for cycle in 0..9 {
+        let outputs = if cycle == 2 {
+            let outputs = runner.run(&Snapshot { cycle, time: 1.0, channels: &[] });
+            let told = outputs.iter().find_map(|output| match output {
+                Output::Monitor(monitor) => Some(monitor.values.clone()),
+                _ => None,
+            });
+            let told = told.expect("the monitors are told of");
+            assert!(!told.is_empty() && told.iter().all(|(_, value)| value.is_nan()), "{told:?}");
+            assert!(matches!(&outputs[..], [.., Output::Error { .. }]), "{outputs:?}");
+            outputs
+        } else {
+            step(&mut runner, cycle, 2.0)
+        };
+        if words(&outputs).contains(&"Pause".to_owned()) {
+            paused.push(cycle);
+        }
+    }
+    // From step 3 on it has held for three steps at step 6, not at step 3.
+    assert_eq!(paused.first(), Some(&6));
+}
+
 #[test]
 fn tables_and_lines_show_what_was_measured_so_far() {
     let pipelines = r#"
@@ -308,6 +338,23 @@ fn what_means_nothing_is_refused_with_its_place() {
         (
             r#"{"name": "a", "on": "end", "stages": [{"quality": {}}]}"#.into(),
             "there is no mesh any more",
+        ),
+        (
+            r#"{"name": "a", "on": "end", "stages": [], "when": "time > 1", "then": [{"pause": {}}]}"#.into(),
+            "pipelines[0].then[0].pause: when the run ends there is no mesh any more, and nobody to obey",
+        ),
+        (
+            r#"{"name": "a", "on": "viewer", "budget": {"percent": 1}, "stages": []}"#.into(),
+            "pipelines[0].budget: a budget thins how often a pipeline runs, expected `every` beside it",
+        ),
+        (
+            r#"{"name": "a", "stages": [{"write": {"file": "a.pvtp"}}]}"#.into(),
+            "write.file: a `.pvtp` file holds surfaces, expected a source stage such as `surface` first, or a `.pvtu` file",
+        ),
+        (
+            r#"{"name": "a", "stages": [{"write": {"file": "a-{cycle}.vtu"}}]},
+                {"name": "b", "stages": [], "when": "cycle > 1", "then": [{"write": {"file": "a-{cycle}.vtu", "keep": 2}}]}"#.into(),
+            "pipelines[1]: another pipeline writes the file `a-{cycle}.vtu`",
         ),
         (
             r#"{"name": "a", "stages": [{"force": {"name": "f", "pressure": "p"}}]}"#.into(),

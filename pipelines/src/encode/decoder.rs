@@ -6,7 +6,7 @@ use tombolo_deform::mesh::{NumberType, Vector};
 
 use super::encoder::{BOUNDED, ELEMENT, EXACT, VERTEX};
 use super::error::{DecodeError, error};
-use super::layout::{Kind, name, open};
+use super::layout::{Kind, check_values, name, open};
 use crate::codec::bytes::Input;
 use crate::codec::{self, Hierarchy, Motion, Topology};
 use crate::extract::{Association, Field};
@@ -89,7 +89,8 @@ impl Decoder {
     /// Decodes one message. Any bytes are answered with a frame or an error.
     ///
     /// A topology takes some hundred bytes for each point, triangle and line, of which there are at
-    /// most 1024 for each byte of its message; a frame some 64 bytes for each value of its topology.
+    /// most 1024 for each byte of its message; a frame some 64 bytes for each of its values, of which
+    /// there are at most 2²⁷, coordinates among them.
     ///
     /// # Errors
     /// [`DecodeError`]. A frame that goes on from one that was not read, or whose topology was not
@@ -216,10 +217,13 @@ impl View {
             return Err(error("header", format!("{count} fields, expected {most}")));
         }
         let mut fields = Vec::new();
+        let mut values = points.as_flattened().len();
         for index in 0..count {
             if is_key {
                 going.fields.push(KnownField::read(input)?);
             }
+            values = values.saturating_add(going.fields[index].values(topology));
+            check_values(values).map_err(|failure| error("fields", failure.to_string()))?;
             fields.push(going.fields[index].decode(topology, input)?);
         }
         if !input.0.is_empty() {
@@ -247,6 +251,15 @@ impl KnownField {
             return Err(error(part(), message));
         }
         Ok(Self { name, association, field: codec::Field::new(components) })
+    }
+
+    /// How many values it has.
+    fn values(&self, topology: &Topology) -> usize {
+        let entities = match self.association {
+            Association::Element => topology.triangles().len() + topology.lines().len(),
+            _ => topology.points().len(),
+        };
+        entities * self.field.components()
     }
 
     fn decode(&mut self, topology: &Topology, input: &mut Input<'_>) -> Result<Field, DecodeError> {

@@ -7,7 +7,7 @@ use tombolo_deform::mesh::Cells;
 
 use super::elements::Elements;
 use super::error::EncodeError;
-use super::layout::{Kind, PREAMBLE, preamble, put_name};
+use super::layout::{Kind, PREAMBLE, check_values, preamble, put_name};
 use crate::codec::bytes::{put_block, put_count};
 use crate::codec::{self, Bound, CodecError, Coded, Field, Motion, Topology};
 use crate::extract::{self, Association, Extract, ExtractFeatures};
@@ -91,6 +91,9 @@ impl Encoder {
         check_finite("time", &[*time], 1)?;
         let positions = extract.points.as_flattened();
         check_finite("points", positions, 3)?;
+        check_values(
+            positions.len() + sent(extract).map(|field| field.values.len()).sum::<usize>(),
+        )?;
         let bound = bound(encoding.positions, diagonal(extract));
         let topology = match self.topology.take() {
             Some(topology) if topology.is_of(extract) => topology,

@@ -1,6 +1,7 @@
 //! The layout that all messages share.
 
 use super::error::{DecodeError, error};
+use crate::codec::CodecError;
 use crate::codec::bytes::{Input, put_block};
 
 /// The first bytes of every message.
@@ -49,6 +50,21 @@ pub(super) fn open(message: &[u8]) -> Result<(Kind, Input<'_>), DecodeError> {
         other => return Err(fault(format!("found kind {other}, expected 1, 2 or 3"))),
     };
     Ok((kind, Input(rest)))
+}
+
+/// The most values of a frame, its coordinates among them.
+pub(super) const MOST_VALUES: usize = 1 << 27;
+
+/// Checks how many values a frame has.
+///
+/// # Errors
+/// [`CodecError::TooLarge`].
+pub(super) fn check_values(found: usize) -> Result<(), CodecError> {
+    if found > MOST_VALUES {
+        let (found, most) = (found as u64, MOST_VALUES as u64);
+        return Err(CodecError::TooLarge { what: "values", found, most });
+    }
+    Ok(())
 }
 
 /// Appends a name, cut off where it is too long.

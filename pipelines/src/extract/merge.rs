@@ -349,9 +349,6 @@ impl Fields {
                 Association::Vertex => (points, self.points),
                 Association::Element => (cells, self.cells),
             };
-            if indices.is_empty() {
-                continue;
-            }
             let same = |(known, _): &(Field, usize)| {
                 (&known.name, known.association, known.components)
                     == (&field.name, field.association, field.components)
@@ -371,6 +368,10 @@ impl Fields {
                     self.fields.len() - 1
                 }
             };
+            // A rank that has nothing of the extract says which fields there are, also where nobody has.
+            if indices.is_empty() {
+                continue;
+            }
             let (known, set) = &mut self.fields[known];
             // Only a field that every rank before this one has brought can be whole.
             if *set < before {

@@ -7,7 +7,7 @@ use super::derived::{Formula, PARAMETER};
 use super::pipeline::{AgainAfter, Due, Pipeline};
 use super::stage::{Action, Stage};
 use super::unread::Found;
-use super::{Csv, Log, Parameter, Problem, Problems, Render, nearest};
+use super::{Csv, Log, Parameter, Problem, Problems, Render, Write, nearest};
 use crate::expression::{Expression, UsedName};
 use crate::limits::{BINS, HISTORY};
 
@@ -319,15 +319,16 @@ pub(super) fn check(config: &Config, found: &mut Found) {
         // A stage with another fault is told of that.
         let is_new = |problem: &Problem| problem.part().is_none_or(|part| !faulty.contains(&part));
         twice.into_iter().map(located).filter(is_new).for_each(|problem| found.push(problem));
-        for table in tables(pipeline) {
-            if files.contains(&(&table.file, index)) {
+        let tables = tables(pipeline).map(|table| &table.file);
+        for file in tables.chain(written(pipeline).map(|write| &write.file)) {
+            if files.contains(&(file, index)) {
                 continue;
             }
-            if files.iter().any(|(file, _)| *file == &table.file) {
-                let message = format!("another pipeline writes the file `{}`", table.file);
+            if files.iter().any(|(known, _)| *known == file) {
+                let message = format!("another pipeline writes the file `{file}`");
                 found.push(located(Problem::new(message)));
             }
-            files.push((&table.file, index));
+            files.push((file, index));
         }
         for render in pictures(pipeline).filter(|render| render.is_database()) {
             if !databases.insert(&render.file) {
@@ -443,6 +444,17 @@ fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
     });
     of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
         Action::Csv(csv) => Some(csv),
+        _ => None,
+    }))
+}
+
+fn written(pipeline: &Pipeline) -> impl Iterator<Item = &Write> {
+    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
+        Stage::Write(write) => Some(write),
+        _ => None,
+    });
+    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
+        Action::Write(write) => Some(write),
         _ => None,
     }))
 }

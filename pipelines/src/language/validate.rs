@@ -132,6 +132,10 @@ impl Pipeline {
         if is_whole {
             self.check_condition(&mut found);
         }
+        if self.budget.is_some() && !matches!(self.due, Due::Every(_)) {
+            let message = "a budget thins how often a pipeline runs, expected `every` beside it";
+            found.push(Problem::new(message).within("budget"));
+        }
         if let Some(budget) = self.budget
             && !(budget.percent > 0.0 && budget.percent <= 100.0)
         {
@@ -299,12 +303,13 @@ impl Made {
     /// Checks an action.
     fn act(&mut self, action: &Action, due: Due) -> Result<(), Problem> {
         match action {
-            Action::Pause {} | Action::Stop {} | Action::Log(_) => Ok(()),
+            Action::Log(_) => Ok(()),
             _ if due == Due::OnEnd && !matches!(action, Action::Csv(_)) => {
                 let message = "when the run ends there is no mesh any more, and nobody to obey; \
                                expected `csv` or `log`";
                 self.of_whole(message)
             }
+            Action::Pause {} | Action::Stop {} => Ok(()),
             Action::Stream(stream) => self.stream(stream),
             Action::Write(write) => self.write(write),
             Action::Csv(csv) => csv.check(),
@@ -406,9 +411,13 @@ impl Made {
     }
 
     fn write(&self, write: &Write) -> Result<(), Problem> {
-        let surface_only = write.file.to_ascii_lowercase().ends_with(".vtp") && !self.extract;
-        if surface_only && self.is_whole {
-            let message = "a `.vtp` file holds surfaces, expected a source stage such as `surface` first, or a `.vtu` file";
+        let file = write.file.to_ascii_lowercase();
+        let of_surfaces = [(".vtp", ".vtu"), (".pvtp", ".pvtu")];
+        let found = of_surfaces.into_iter().find(|(ending, _)| file.ends_with(ending));
+        if let Some((ending, other)) = found.filter(|_| !self.extract && self.is_whole) {
+            let message = format!(
+                "a `{ending}` file holds surfaces, expected a source stage such as `surface` first, or a `{other}` file"
+            );
             return Err(Problem::new(message).within("file"));
         }
         check_file(&write.file).map_err(|problem| problem.within("file"))

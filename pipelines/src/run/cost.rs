@@ -20,6 +20,16 @@ pub struct Cost {
     pub every: u32,
 }
 
+impl Cost {
+    /// Notes a run that took so many seconds.
+    pub(super) fn ran(&mut self, seconds: f64) {
+        let seconds = seconds.max(0.0);
+        self.runs += 1;
+        self.seconds += seconds;
+        self.last_seconds = seconds;
+    }
+}
+
 /// The most that a cadence is thinned.
 const MOST: u32 = 1 << 16;
 /// After so many runs a judgement is made anew.

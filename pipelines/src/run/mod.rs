@@ -237,11 +237,7 @@ impl Runner {
                         &self.board,
                         &mut outputs,
                     ),
-                    Err(message) => {
-                        let errors = vec![("channel".into(), message)];
-                        prepared.report(snapshot.cycle, errors, &mut outputs);
-                        vec![f64::NAN; prepared.monitors().len()]
-                    }
+                    Err(message) => prepared.without_channel(snapshot, message, &mut outputs),
                 };
             if let Some(history) = self.board.histories.get_mut(prepared.index)
                 && !measured.is_empty()
@@ -263,9 +259,17 @@ impl Runner {
     pub fn finish(&mut self, cycle: u64, time: f64) -> Vec<Output> {
         let mut outputs = Vec::new();
         for prepared in &mut self.pipelines {
-            if prepared.is_chosen && prepared.pipeline.due == Due::OnEnd {
-                prepared.end(cycle, time, &*self.communicator, &self.board, &mut outputs);
+            if !(prepared.is_chosen && prepared.pipeline.due == Due::OnEnd) {
+                continue;
             }
+            let begun = (self.clock)();
+            let values = prepared.end(cycle, time, &*self.communicator, &self.board, &mut outputs);
+            if let Some(history) = self.board.histories.get_mut(prepared.index)
+                && !values.is_empty()
+            {
+                history.push(Measured { cycle, time, values });
+            }
+            prepared.cost.ran((self.clock)() - begun);
         }
         outputs
     }

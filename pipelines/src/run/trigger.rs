@@ -79,6 +79,11 @@ impl Trigger {
         Ok(())
     }
 
+    /// Forgets since when the condition has held: whether it still does is not known.
+    pub(super) fn lapse(&mut self) {
+        self.since = None;
+    }
+
     /// Whether the actions are taken now.
     pub(super) fn fires(&mut self, now: Moment, value: impl Fn(&Slot) -> f64) -> bool {
         let holds = self.condition.as_ref().is_none_or(|condition| condition.holds(&value));

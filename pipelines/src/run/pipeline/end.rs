@@ -1,18 +1,17 @@
 //! The end of a run, and of each run of a pipeline.
 
-use std::sync::Arc;
-
 use tombolo_deform::communicator::{Communicator, Reduction};
 
 use super::super::due::Now;
 use super::super::history::Board;
-use super::super::output::{MonitorValues, Output};
+use super::super::output::Output;
 use super::prepare::Names;
 use super::{Prepared, Seen};
 use crate::language::{Action, Stage};
 
 impl Prepared {
-    /// Does what a pipeline does at the end of the run, where there are monitors and no mesh.
+    /// Does what a pipeline does at the end of the run, where there are monitors and no mesh. Returns
+    /// the values of the monitors.
     pub(crate) fn end(
         &mut self,
         cycle: u64,
@@ -20,7 +19,7 @@ impl Prepared {
         communicator: &dyn Communicator,
         board: &Board,
         outputs: &mut Vec<Output>,
-    ) {
+    ) -> Vec<f64> {
         #[expect(clippy::cast_precision_loss, reason = "cycles below 2^53")]
         let mut values = vec![cycle as f64, time];
         let is_first = communicator.rank() == 0;
@@ -36,20 +35,11 @@ impl Prepared {
                 _ => {}
             }
         }
-        if values.len() > 2 {
-            let names = self.monitors.iter().map(|monitor| monitor.name.clone());
-            outputs.push(Output::Monitor(MonitorValues {
-                pipeline: Arc::clone(&self.name),
-                cycle,
-                time,
-                values: names.zip(values[2..].iter().copied()).collect(),
-            }));
-        }
+        outputs.extend(self.told(cycle, time, &values[2..]));
         let seen = Seen { cycle, time, values: &values, board, is_first };
-        if !self.trigger.fires((cycle, time), |slot| seen.value(slot)) {
-            return;
-        }
-        for (action, names) in self.pipeline.then.iter().zip(&self.names_of_actions) {
+        let fires = self.trigger.fires((cycle, time), |slot| seen.value(slot));
+        let actions = self.pipeline.then.iter().zip(&self.names_of_actions);
+        for (action, names) in actions.filter(|_| fires) {
             match action {
                 Action::Csv(_) => outputs.extend(self.row(names, &seen)),
                 Action::Log(log) => outputs.extend(self.log(log, names, &seen)),
@@ -57,6 +47,7 @@ impl Prepared {
                 _ => {}
             }
         }
+        values.split_off(2)
     }
 
     /// Notes what a run has cost, by seconds of the clock; where the cadence changes for that, what
@@ -69,9 +60,7 @@ impl Prepared {
         communicator: &dyn Communicator,
     ) -> Option<String> {
         let seconds = (ended - begun).max(0.0);
-        self.cost.runs += 1;
-        self.cost.seconds += seconds;
-        self.cost.last_seconds = seconds;
+        self.cost.ran(seconds);
         let rests = self.rest.only_shows() && !self.rest.is_watched(now);
         if !rests && !self.thinning.is_limited() {
             return None;

@@ -216,15 +216,7 @@ impl Prepared {
         let mut progress = self.begin(snapshot, channel, source, communicator, board, outputs);
         self.run_stages(&mut progress);
         let measured = progress.values[2..].to_vec();
-        if !measured.is_empty() {
-            let names = self.monitors.iter().map(|monitor| monitor.name.clone());
-            progress.outputs.push(Output::Monitor(MonitorValues {
-                pipeline: Arc::clone(&self.name),
-                cycle: snapshot.cycle,
-                time: snapshot.time,
-                values: names.zip(measured.iter().copied()).collect(),
-            }));
-        }
+        progress.outputs.extend(self.told(snapshot.cycle, snapshot.time, &measured));
         let fires = {
             let value = |slot: &Slot| progress.value(slot);
             self.trigger.fires((snapshot.cycle, snapshot.time), value)
@@ -242,6 +234,30 @@ impl Prepared {
         let errors = errors_of_all(communicator, std::mem::take(&mut progress.errors));
         self.report(snapshot.cycle, errors, outputs);
         measured
+    }
+
+    /// Where the channel is not there or cannot be used: the monitors have no value, and what the
+    /// condition has waited for is not known to have lasted. Returns the values of the monitors.
+    pub(super) fn without_channel(
+        &mut self,
+        snapshot: &Snapshot,
+        message: String,
+        outputs: &mut Vec<Output>,
+    ) -> Vec<f64> {
+        let unknown = vec![f64::NAN; self.monitors.len()];
+        outputs.extend(self.told(snapshot.cycle, snapshot.time, &unknown));
+        self.trigger.lapse();
+        self.report(snapshot.cycle, vec![("channel".into(), message)], outputs);
+        unknown
+    }
+
+    /// What is told of the values of the monitors; nothing where there are none.
+    fn told(&self, cycle: u64, time: f64, values: &[f64]) -> Option<Output> {
+        let names = self.monitors.iter().map(|monitor| monitor.name.clone());
+        (!values.is_empty()).then(|| {
+            let values = names.zip(values.iter().copied()).collect();
+            Output::Monitor(MonitorValues { pipeline: Arc::clone(&self.name), cycle, time, values })
+        })
     }
 
     fn run_stages(&mut self, progress: &mut Progress) {
