@@ -154,11 +154,6 @@ impl Prepared {
         })
     }
 
-    /// The monitors, without `cycle` and `time`.
-    pub(crate) fn monitors(&self) -> &[Monitor] {
-        &self.monitors
-    }
-
     pub(crate) fn streams(&self) -> bool {
         self.pipeline.streams()
     }
