@@ -109,9 +109,9 @@ export class Connection {
     this.change("dismissed", why);
   }
 
-  /** Tries again at once, if a connection is not there already. */
+  /** Tries again at once, if a connection is not there already; an attempt that hangs is given up. */
   retry(): void {
-    if (this.state !== "dismissed" && (this.state === "connected" || this.timer === null)) return;
+    if (this.state === "connected" || this.state === "ended") return;
     this.attempt = 0;
     this.clearTimer();
     this.open();

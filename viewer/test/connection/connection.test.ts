@@ -180,6 +180,28 @@ describe("a connection", () => {
     expect([sockets.length, timers.length]).toEqual([5, 0]);
   });
 
+  it("gives an attempt that hangs up when somebody tries again, and no connection that is there", async () => {
+    const { connection, sockets, timers, states } = setUp();
+    connection.retry();
+    expect(sockets.map(({ readyState }) => readyState)).toEqual([3, 0]);
+    sockets[1]!.end(1006);
+    await settle();
+    timers[0]!.action();
+    // No answer comes to this one either.
+    connection.retry();
+    expect(sockets.map(({ readyState }) => readyState)).toEqual([3, 3, 3, 0]);
+    // What is given up tells nothing, and is not come back to.
+    await settle();
+    expect([states.length, timers.length]).toEqual([1, 1]);
+    sockets[3]!.open();
+    connection.retry();
+    expect(sockets).toHaveLength(4);
+    // Nor is a run that has ended come back to.
+    sockets[3]!.end(1000);
+    connection.retry();
+    expect([connection.state, sockets.length]).toEqual(["ended", 4]);
+  });
+
   it("says when nothing could be sent, and sends JSON when it could", () => {
     const { connection, sockets } = setUp();
     expect(connection.send({ pause: {} })).toBe(false);
