@@ -330,6 +330,8 @@ export class Handles {
     const isElsewhere = !this.box.isFocused && (textField(target) ?? target?.closest?.('input, select, button, summary, [role="slider"]'));
     if ((isElsewhere || isSheetOpen()) && !this.press) return;
     const axis = ["x", "y", "z"].indexOf(event.key.toLowerCase());
+    // Applies what is seen: the key goes on to where that is done.
+    if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) return this.close();
     if (event.key === "Escape") this.abort();
     else if (event.key === "Enter") this.finish();
     else if (event.ctrlKey || event.metaKey || event.altKey) return;

@@ -146,6 +146,20 @@ describe("shaping by hand", () => {
       expect([moved(), document.activeElement]).toEqual([[0, 3, 0], scene]);
     });
 
+    it("ends with Ctrl+Enter, also in the number, and leaves the key to Apply", () => {
+      for (const target of [(): EventTarget => scene, box]) {
+        drag(arrow(), way([0, 0, 0], [0, 0, 0.4]));
+        const by = moved();
+        if (target === box) box().focus();
+        const heard: string[] = [];
+        const hearing = new AbortController();
+        window.addEventListener("keydown", ({ key: name }) => heard.push(name), { signal: hearing.signal });
+        const isLeft = target().dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", ctrlKey: true, bubbles: true, cancelable: true }));
+        hearing.abort();
+        expect([isLeft, heard, box().closest("label")!.hidden, moved()]).toEqual([true, ["Enter"], true, by]);
+      }
+    });
+
     it("leaves keys to what has the focus elsewhere while a number can be typed, and to a sheet that lies over the page", () => {
       key("g");
       const plot = document.createElement("div");
