@@ -4,7 +4,9 @@ import type { PipelineErrors, PipelineQuestion } from "../kernel/language";
 /** The part of a worker that is needed, so that a test can stand in for it. */
 export interface CheckWorker {
   postMessage(message: unknown): void;
+  terminate(): void;
   onmessage: ((event: MessageEvent<CheckAnswer>) => void) | null;
+  onerror: ((event: ErrorEvent) => void) | null;
 }
 
 /** What the worker answers: the errors of the text, or why it could not be checked. */
@@ -28,14 +30,25 @@ export class Checker {
     this.waiting = null;
     this.underway = waiting?.answered ?? null;
     if (!waiting) return;
-    if (!this.worker) {
-      this.worker = this.start();
-      this.worker.onmessage = ({ data }) => {
-        const answered = this.underway;
-        this.next();
-        answered?.(data);
-      };
-    }
+    this.worker ??= this.started();
     this.worker.postMessage(waiting.question);
+  }
+
+  private started(): CheckWorker {
+    const worker = this.start();
+    worker.onmessage = ({ data }) => this.take(data);
+    // One that could not start answers nothing: the next question is another's.
+    worker.onerror = ({ message }) => {
+      worker.terminate();
+      this.worker = null;
+      this.take({ failure: message || "what checks it could not be started" });
+    };
+    return worker;
+  }
+
+  private take(answer: CheckAnswer): void {
+    const answered = this.underway;
+    this.next();
+    answered?.(answer);
   }
 }

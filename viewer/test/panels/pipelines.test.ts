@@ -16,7 +16,7 @@ const health: Pipeline = { name: "health", stages: [{ quality: {} }] };
 
 /** A worker that finds what `find` finds. */
 function worker(find: (question: PipelineQuestion) => CheckAnswer): CheckWorker {
-  const made: CheckWorker = { onmessage: null, postMessage: (question) => made.onmessage?.({ data: find(question as PipelineQuestion) } as MessageEvent<CheckAnswer>) };
+  const made: CheckWorker = { onmessage: null, onerror: null, terminate: () => undefined, postMessage: (question) => made.onmessage?.({ data: find(question as PipelineQuestion) } as MessageEvent<CheckAnswer>) };
   return made;
 }
 
