@@ -99,8 +99,7 @@ export class Previewer {
   private started(): Preview {
     if (this.preview) return this.preview;
     const worker = new Worker(new URL("./preview.worker.ts", import.meta.url), { type: "module" });
-    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => this.failWhole(String(error)));
-    this.preview = new Preview(worker, () => fetchSurface(this.address), {
+    const preview = new Preview(worker, () => fetchSurface(this.address), {
       surface: (surface) => this.takeSurface(surface),
       shape: (shape) => this.take(shape),
       checked: (faults, isNewest) => this.judge(faults, isNewest),
@@ -124,9 +123,20 @@ export class Previewer {
         this.say(NO_PREVIEW);
       },
     });
-    worker.addEventListener("error", (event) => this.failWhole(event.message || "the geometry kernel could not be started"));
-    this.preview.offer(this.surface);
-    return this.preview;
+    this.preview = preview;
+    // Nothing that was asked of it comes: the next wish is another's.
+    const failed = (reason: string): void => {
+      if (this.preview !== preview) return;
+      this.preview = null;
+      worker.terminate();
+      this.answerWaiting(({ reject }) => reject(new Error(reason)));
+      preview.offer(null);
+      this.fail(reason);
+    };
+    this.module.then((module) => worker.postMessage({ module }), (error: unknown) => failed(String(error)));
+    worker.addEventListener("error", (event) => failed(event.message || "the geometry kernel could not be started"));
+    preview.offer(this.surface);
+    return preview;
   }
 
   private takeSurface(surface: PreviewSurface): void {
@@ -167,12 +177,6 @@ export class Previewer {
     const numbers = new Set([...triangles].map((triangle) => this.shown?.triangleFeatures[triangle]));
     const names = [...numbers].map((number) => (number === undefined ? undefined : this.features[number]));
     return names.every((name) => name !== undefined) ? names : [];
-  }
-
-  /** Nothing that was asked for comes. */
-  private failWhole(reason: string): void {
-    this.fail(reason);
-    this.answerWaiting(({ reject }) => reject(new Error(reason)));
   }
 
   private fail(reason: string): void {

@@ -17,6 +17,8 @@ class StandIn {
   private failed: (event: { message: string }) => void = () => undefined;
   constructor() { StandIn.last = this; }
   postMessage(request: PreviewRequest): void { this.asked.push(request); }
+  isEnded = false;
+  terminate(): void { this.isEnded = true; }
   addEventListener(_: string, failed: (event: { message: string }) => void): void { this.failed = failed; }
   answer(data: PreviewAnswer): void { this.onmessage?.({ data } as MessageEvent<PreviewAnswer>); }
   fail(message: string): void { this.failed({ message }); }
@@ -61,7 +63,11 @@ describe("what is seen of a shape while a hand makes it", () => {
   const last = (key: "number" | "check"): number => StandIn.last.asked.flatMap((request) => (key in request ? [(request as Record<typeof key, number>)[key]] : [])).at(-1)!;
   /** The hand asks for a shape, and it comes. */
   const drag = (by: number): Float32Array => {
-    made.store.dispatch({ type: "composed", key: "translate", values: { by: [by, 0, 0] }, step: "drag" });
+    wish(by);
+    return come(by);
+  };
+  const wish = (by: number): void => made.store.dispatch({ type: "composed", key: "translate", values: { by: [by, 0, 0] }, step: "drag" });
+  const come = (by: number): Float32Array => {
     const points = new Float32Array(12).fill(by);
     StandIn.last.answer({ number: last("number"), points, nodes: Float32Array.of(by, 0, 0, 1 + by, 0, 0), largest: by, moved: [by, 0], size: 1, milliseconds: 1 });
     return points;
@@ -109,6 +115,22 @@ describe("what is seen of a shape while a hand makes it", () => {
     expect([ghost.coordinates, broken()]).toEqual([null, []]);
     drag(2);
     expect([ghost.coordinates?.[0], broken()]).toEqual([2, []]);
+  });
+
+  it("fails with the thread that computes it, and comes of another one with the next wish", async () => {
+    const first = StandIn.last;
+    wish(1);
+    expect(made.store.state.preview.state).toBe("waiting");
+    first.fail("out of memory");
+    expect([made.store.state.preview.state, made.store.state.preview.reason, first.isEnded, StandIn.last === first]).toEqual(["failed", "out of memory", true, true]);
+    wish(2);
+    await settled();
+    StandIn.last.answer(SURFACE);
+    come(2);
+    expect([made.store.state.preview.state, ghost.coordinates?.[0], StandIn.last === first]).toEqual(["shown", 2, false]);
+    // What comes late of the first is nothing.
+    first.fail("again");
+    expect(made.store.state.preview.state).toBe("shown");
   });
 
   it("has the skeleton in it, which goes back with what is given up", () => {
