@@ -121,6 +121,11 @@ const steps = [
     const why = "This is a recording: it can be watched, and not be steered.";
     const quality = page.getByRole("button", { name: "Colour by mesh quality" });
     check(await quality.isDisabled() && (await quality.getAttribute("title")) === why, "the quality of the mesh is offered");
+    for (const name of ["Skeleton", "Faces"]) {
+      const tool = page.getByRole("button", { name, exact: true });
+      const title = await tool.getAttribute("title");
+      check(await tool.isDisabled() && title === "This is a recording: the surface from which shapes are measured is not in it.", `${name} is offered, or says "${title}"`);
+    }
     const refused = (what) => viewer.holds(what, (words) => { const said = document.getElementById("refusal"); return !said.hidden && said.textContent.includes(words) && said.textContent; }, why);
     await page.click("#quality");
     const cells = await refused("why there are no worst cells");

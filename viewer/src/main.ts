@@ -44,6 +44,7 @@ import { watchDrawers } from "./panels/drawers";
 import { WorstCells } from "./panels/quality";
 import { QualityHistogram } from "./panels/quality-histogram";
 import { SlicePanel } from "./panels/slice";
+import { watchSurfaceTools } from "./panels/surface-tools";
 import { Tour } from "./panels/tour";
 import { CameraTools, Theming, watchPictureTools } from "./panels/tools";
 import { ViewList } from "./panels/views";
@@ -444,12 +445,7 @@ store.watch((state) => state.looks, (looks) => {
 });
 store.watch(appliedOrders, (marks) => history.setMarks(marks));
 
-part("skeleton").addEventListener("click", (event) => {
-  const button = event.currentTarget as HTMLButtonElement;
-  const shown = button.getAttribute("aria-pressed") !== "true";
-  button.setAttribute("aria-pressed", String(shown));
-  previewer.showSkeleton(shown);
-});
+watchSurfaceTools(store, previewer, report);
 
 publish(inspectionOf(store, scene, handles, sliceHandle));
 

@@ -180,9 +180,9 @@ export class Preview {
     }
   }
 
-  /** There is no surface; the next wish asks for it again. Where nothing is wished for yet, nobody need hear of it. */
+  /** There is no surface; the next wish asks for it again. Where nothing is wished for yet, nobody need hear of it; of the skeleton is told by itself. */
   private without(kind: FailureKind | "surface-missing", reason: string): void {
-    const isWanted = this.waiting !== null || this.wanted !== null || this.wantedPoints !== null;
+    const isWanted = this.waiting !== null || this.wantedPoints !== null;
     this.state = "absent";
     this.waiting = null;
     if (this.wanted !== null) this.events.skeleton(null, reason);

@@ -26,6 +26,8 @@ export class Previewer {
   private bones = false;
   private faulty: Uint32Array | undefined;
   private readonly surfaceListeners = new Set<(surface: ShownPoints) => void>();
+  /** Hears why the skeleton that was asked for is not there. */
+  noSkeleton: (reason: string) => void = () => undefined;
   /** Who waits for the points once. */
   private waiting: { resolve: (surface: ShownPoints) => void; reject: (reason: Error) => void }[] = [];
   private shown: PreviewSurface | null = null;
@@ -76,6 +78,11 @@ export class Previewer {
     else this.scene.setBones(null);
   }
 
+  private loseSkeleton(reason: string): void {
+    this.showSkeleton(false);
+    this.noSkeleton(reason);
+  }
+
   private get stack(): Json[] {
     return this.store.state.hello?.stack ?? [];
   }
@@ -112,8 +119,8 @@ export class Previewer {
       noPoints: (reason) => this.answerWaiting(({ reject }) => reject(new Error(reason))),
       skeleton: (bones, reason) => {
         if (!this.bones) return;
-        this.scene.setBones(bones);
-        if (bones === null) this.fail(`there is no skeleton: ${reason}`);
+        if (bones === null) this.loseSkeleton(reason);
+        else this.scene.setBones(bones);
       },
       failed: (_, reason) => this.fail(reason),
       cleared: () => {
@@ -131,6 +138,7 @@ export class Previewer {
       worker.terminate();
       this.answerWaiting(({ reject }) => reject(new Error(reason)));
       preview.offer(null);
+      if (this.bones) this.loseSkeleton(reason);
       this.fail(reason);
     };
     this.module.then((module) => worker.postMessage({ module }), (error: unknown) => failed(String(error)));

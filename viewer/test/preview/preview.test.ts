@@ -198,5 +198,11 @@ describe("the preview", () => {
     answer({ skeleton: "a", kind: "skeleton", error: "it is flat" });
     expect(heard).toEqual(["skeleton 1", "no skeleton: it is flat"]);
     expect(fetched()).toBe(1);
+    // It is no preview that fails.
+    const failing = setUp(async () => { throw new Error("gone"); });
+    failing.preview.offer(A);
+    failing.preview.skeleton([]);
+    await settled();
+    expect(failing.heard).toEqual(["cleared", "no skeleton: gone"]);
   });
 });

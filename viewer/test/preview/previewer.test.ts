@@ -117,6 +117,21 @@ describe("what is seen of a shape while a hand makes it", () => {
     expect([ghost.coordinates?.[0], broken()]).toEqual([2, []]);
   });
 
+  it("stays where there is no skeleton, and that is told by itself", () => {
+    const reasons: string[] = [];
+    previewer.noSkeleton = (reason) => reasons.push(reason);
+    drag(1);
+    previewer.showSkeleton(true);
+    StandIn.last.answer({ skeleton: "s", kind: "skeleton", error: "it is a sheet" });
+    expect([reasons, ghost.coordinates?.[0], made.store.state.preview.state, bones]).toEqual([["it is a sheet"], 1, "shown", null]);
+    previewer.showSkeleton(true);
+    StandIn.last.fail("out of memory");
+    expect([reasons[1], made.store.state.preview.reason]).toEqual(["out of memory", "out of memory"]);
+    // Nobody waits for one any more.
+    made.store.dispatch({ type: "stack", edits: [{ translate: {} }], undoable: 1 });
+    expect(StandIn.last.asked.some((request) => "skeleton" in request && request.stack.length > 0)).toBe(false);
+  });
+
   it("fails with the thread that computes it, and comes of another one with the next wish", async () => {
     const first = StandIn.last;
     wish(1);
