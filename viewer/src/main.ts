@@ -432,7 +432,7 @@ store.watch((state) => state.hello, (hello) => {
 new Notice(store);
 store.watch((state) => state.draft.updating, (updating) => write(part("edit-title"), updating === null ? "New edit" : `Edit ${updating + 1}`));
 
-watchEmpty(store);
+watchEmpty(store, onlyView);
 part("retry").addEventListener("click", () => connection.retry());
 window.addEventListener("online", () => { if (connection.state !== "dismissed" && !store.state.end) connection.retry(); });
 

@@ -33,3 +33,10 @@ export function nearest(name: string, known: readonly string[]): string | null {
   }
   return best?.candidate ?? null;
 }
+
+/** The most names that are listed where none is near. */
+const LISTED = 8;
+
+/** The names that there are, in words. */
+export const listed = (known: readonly string[]): string =>
+  known.slice(0, LISTED).join(", ") + (known.length > LISTED ? ` and ${known.length - LISTED} more` : "");

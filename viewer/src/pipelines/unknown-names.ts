@@ -8,7 +8,7 @@ import { warningMark } from "./marks";
 import type { Mark } from "./marks";
 import { namesAt } from "./names";
 import type { RunNames } from "./names";
-import { nearest } from "./nearest";
+import { listed, nearest } from "./nearest";
 import { rangeOf, readSoFar } from "./place";
 import type { Path } from "./place";
 import { isBody, madeFields } from "./stages";
@@ -16,8 +16,6 @@ import { nameKind } from "./suggestions";
 
 /** The names that formulas have without any field. */
 const GIVEN: ReadonlySet<string> = new Set(["x", "y", "z", "time", "cycle", "pi"]);
-/** The most names that are listed where none is near. */
-const LISTED = 8;
 
 interface Text { path: Path; text: string }
 
@@ -51,8 +49,7 @@ export function unknownNames(source: string, run: RunNames): Mark[] {
 function unknown(kind: "feature" | "field", name: string, known: readonly string[]): Unknown {
   const near = nearest(name, known);
   const message = kind === "feature" ? `the run has no feature \`${name}\`` : `neither the run nor a stage before has a field \`${name}\``;
-  const more = known.length > LISTED ? ` and ${known.length - LISTED} more` : "";
-  return { message: near === null ? `${message}; the ${kind}s are ${known.slice(0, LISTED).join(", ")}${more}` : message, near };
+  return { message: near === null ? `${message}; the ${kind}s are ${listed(known)}` : message, near };
 }
 
 function inFormula(source: string, path: Path, formula: string, fields: readonly string[], parameters: readonly string[]): Mark[] {
