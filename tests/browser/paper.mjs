@@ -1,7 +1,8 @@
 /**
  * One of the paper's three demonstrations in Debian's Chromium, each by another means: the throat of the nozzle is pinched by the keyboard
  * alone, the outlet of the bypass is made less steep by the mouse, the pipe is widened by touch. Each is previewed, forecast, applied,
- * measured and taken back. By keyboard and touch an earlier edit is changed, the wheel handed over, a pipeline added. Then the run is stopped.
+ * measured and taken back. By keyboard and touch an earlier edit is changed, a refusal met by its remedies, the wheel handed over, a pipeline
+ * added. Then the run is stopped.
  *
  *     TOMBOLO_DEMONSTRATION=nozzle TOMBOLO_URL=http://127.0.0.1:7070/?token=... TOMBOLO_PID=... node tests/browser/paper.mjs
  *
@@ -24,16 +25,22 @@ const known = async () => new Set((await viewer.look()).orders.map((order) => or
 /** What was measured before the shape was changed, and what the page has said. */
 const before = {}, forecasts = {};
 
-/** Waits for the preview and the forecast of what stands in the form. */
+/** Waits for the forecast of what stands in the form. */
+async function answered() {
+  const { forecast } = await viewer.until("the forecast", ({ forecast: now }) => {
+    check(now.state !== "failed", `there is no forecast: ${now.reason}`);
+    return now.state === "told";
+  });
+  return forecast;
+}
+
+/** Waits for the preview and the forecast of what stands in the form, which is to pass. */
 async function foretold() {
   const { preview } = await viewer.until("the preview", ({ preview: now }) => {
     check(now.state !== "failed", `there is no preview: ${now.reason}`);
     return now.state === "shown";
   });
-  const { forecast } = await viewer.until("the forecast", ({ forecast: now }) => {
-    check(now.state !== "failed", `there is no forecast: ${now.reason}`);
-    return now.state === "told";
-  });
+  const forecast = await answered();
   check(forecast.outcome === "applied" && forecast.inverted === 0, `the forecast is ${JSON.stringify(forecast)}`);
   const text = await page.locator("#forecast").textContent();
   check(/^Forecast: least quality 0\.\d+/.test(text), `the page says "${text}"`);
@@ -81,8 +88,9 @@ async function asTheyWere(...features) {
 const number = (label) => `.object:not([hidden]) input[aria-label="${label}"]`;
 
 /**
- * What else is done by the same means as the demonstration, which has been taken back: an edit that is not the last is changed, the wheel
- * goes to a colleague and comes back, a view is added from a template. `hand` is what is made of a viewer: its keys, its fingers.
+ * What else is done by the same means as the demonstration, which has been taken back: an edit that is not the last is changed, one that
+ * would be refused meets each of its remedies, the wheel goes to a colleague and comes back, a view is added from a template. `hand` is what
+ * is made of a viewer: its keys, its fingers.
  */
 const more = (hand, { feature, axis, second, changed, expected }) => [
   ["the first of two edits is changed by the same means", async () => {
@@ -99,6 +107,37 @@ const more = (hand, { feature, axis, second, changed, expected }) => [
     await scaled(feature, expected);
     check((await viewer.look()).stack.length === 2, "the second edit is gone");
     await viewer.picture("first-edit");
+  }],
+  ["a refusal is met by each of its remedies by the same means", async () => {
+    const refused = async () => {
+      await hand.write(number(`factors ${axis}`), 0.01);
+      const forecast = await answered();
+      check(forecast.outcome === "rejected" && forecast.fraction > 0, `the forecast is ${JSON.stringify(forecast)}`);
+      check(await page.locator("#apply").isDisabled(), "Apply can be pressed though it would be refused");
+      return forecast;
+    };
+    const { fraction } = await refused();
+    await viewer.picture("refused");
+    const { pixels } = await viewer.drawn();
+    await hand.press("#show-worst");
+    check((await viewer.drawn()).pixels !== pixels, "the camera did not go to the worst cell");
+    await viewer.picture("worst-cell");
+    await hand.press('[data-camera="reset"]');
+    const offered = await page.locator("#apply-part").textContent();
+    check(/^Apply \d+(\.\d+)? %$/.test(offered), `the first button says "${offered}"`);
+    await hand.press("#apply-part");
+    const filled = Number(await page.locator(number(`factors ${axis}`)).inputValue());
+    check(Math.abs(1 - filled - 0.99 * fraction) < 0.002, `${offered} fills in ${filled}, ${fraction} would pass`);
+    await foretold();
+    check(await page.locator("#apply").isEnabled(), "Apply cannot be pressed though it would pass");
+    const again = await refused();
+    check((await page.getAttribute("#untangle", "hidden")) === null, `Untangle is not offered: ${JSON.stringify(again)}`);
+    await hand.press("#untangle");
+    const untangled = await answered();
+    check((await page.getAttribute("#untangle", "hidden")) !== null, "Untangle is offered again");
+    console.log(`    refused at 0.01: ${offered}; untangled it is ${untangled.outcome}`);
+    await hand.press("#cancel");
+    check((await page.locator(number(`factors ${axis}`)).inputValue()) === "1" && (await viewer.look()).stack.length === 2, "what was refused is left behind");
   }],
   ["the wheel is handed over and comes back by the same means", async () => {
     colleague = await Viewer.open(browser, "colleague", options);
