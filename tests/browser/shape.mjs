@@ -78,8 +78,8 @@ const steps = [
     await page.selectOption("#action", "translate");
     await page.check('input[aria-label="outlet: handle"]');
     await first.field("by z").fill("0.04");
-    await page.waitForFunction(() => !document.getElementById("open-moved").hidden);
-    const words = await first.text("#open-moved");
+    // Until the first preview has come it says that nothing is known yet.
+    const words = await first.holds("what would move", () => { const said = document.getElementById("open-moved"); return !said.hidden && / would move /.test(said.innerText) && said.innerText; });
     check(/outlet \(outflow\) would move by 0\.04/.test(words), `the page says "${words}"`);
     check((await first.text("#apply")) === "Apply anyway", `the button says "${await first.text("#apply")}"`);
     await first.picture("open-moved");

@@ -3,7 +3,7 @@ import type { Json, SurfaceInformation } from "../connection/protocol";
 import type { ShapeFaults } from "../kernel/kernel";
 import type { Scene } from "../picture/scene";
 import type { Action } from "../store/actions";
-import { wishedStack } from "../store/draft";
+import { moverOf, wishedStack } from "../store/draft";
 import { mayDrive } from "../store/run";
 import { NO_PREVIEW } from "../store/state";
 import type { PreviewState, State } from "../store/state";
@@ -21,6 +21,8 @@ const PREPARED = 200_000;
 export class Previewer {
   private preview: Preview | null = null;
   private wished: Json[] | null = null;
+  /** What the preview that is shown or waited for is moved by. */
+  private mover: Json = null;
   private features: string[] = [];
   private points: Float32Array = new Float32Array(0);
   private bones = false;
@@ -98,7 +100,12 @@ export class Previewer {
       else this.say(NO_PREVIEW);
       return;
     }
-    this.say({ ...this.store.state.preview, state: "waiting", faults: null, brokenIn: [] });
+    const mover = moverOf(this.store.state);
+    const { preview } = this.store.state;
+    // Another amount moves about the same features; another handle may move others, of which nothing is known yet.
+    const moved = sameJson(mover, this.mover) ? preview.moved : null;
+    this.mover = mover;
+    this.say({ ...preview, state: "waiting", moved, faults: null, brokenIn: [] });
     this.started().show(this.stack, wished);
   }
 

@@ -205,13 +205,27 @@ export function openBoundaries(state: Pick<State, "hello">): string[] {
   return (state.hello?.features ?? []).filter(({ condition }) => condition === "inflow" || condition === "outflow").map(({ name }) => name);
 }
 
+/** What decides which features an edit moves, whatever its amounts. */
+export function moverOf(state: State): Json {
+  const { key, updating } = state.draft;
+  return [key, updating, chosen(state, "handle"), chosen(state, "fixed"), bodyOf(state.draft).region ?? null];
+}
+
+/** Open boundaries that may move, while no preview has said whether they do. */
+export function openBoundariesUnknown(state: State): string[] {
+  const { preview, selection } = state;
+  const isUnknown = preview.moved === null && (preview.state === "waiting" || preview.state === "failed");
+  if (!isUnknown || wishedStack(state) === null) return [];
+  return openBoundaries(state).filter((name) => own(selection.parts, name) !== "fixed");
+}
+
 /** Open boundaries that what is previewed would move by more than a hundredth of the surface's size. */
 export function openBoundariesMoved(state: State): { name: string; condition: string; by: number; part: number }[] {
-  const { preview, hello } = state;
-  if (preview.state !== "shown" || !preview.size) return [];
+  const { preview: { moved, size }, hello } = state;
+  if (!moved || !size) return [];
   return (hello?.features ?? []).flatMap(({ name, condition }) => {
-    const by = own(preview.moved, name) ?? 0;
-    const part = by / preview.size!;
+    const by = own(moved, name) ?? 0;
+    const part = by / size;
     return (condition === "inflow" || condition === "outflow") && part > OPEN_BOUNDARY_MOTION ? [{ name, condition, by, part }] : [];
   });
 }

@@ -47,8 +47,8 @@ export interface PreviewState {
   state: "none" | "waiting" | "shown" | "failed";
   /** How far the edits would move any point of the surface. */
   largest: number | null;
-  /** How far they would move each feature, by name. */
-  moved: Readonly<Record<string, number>>;
+  /** How far they would move each feature, by name; while a preview is computed, the one before it; null as long as that is not known. */
+  moved: Readonly<Record<string, number>> | null;
   /** The diagonal of the box around the surface. */
   size: number | null;
   /** Milliseconds from the newest change of the form to its picture, and those of them that went into computing it. */
@@ -123,7 +123,7 @@ export interface State {
   errors: readonly string[];
 }
 
-export const NO_PREVIEW: PreviewState = { state: "none", largest: null, moved: {}, size: null, milliseconds: null, computing: null, reason: null, faults: null, brokenIn: [] };
+export const NO_PREVIEW: PreviewState = { state: "none", largest: null, moved: null, size: null, milliseconds: null, computing: null, reason: null, faults: null, brokenIn: [] };
 export const NO_FORECAST: ForecastState = { state: "none", answer: null, reason: null };
 
 export const INITIAL: State = {

@@ -2,7 +2,7 @@
 import type { Vector } from "../connection/protocol";
 import type { Values } from "../form/schema";
 import { digits, seconds } from "../number";
-import { asksNothing, bodyOf, chosen, isObject, missing, openBoundariesMoved } from "./draft";
+import { asksNothing, bodyOf, chosen, isObject, missing, openBoundariesMoved, openBoundariesUnknown } from "./draft";
 import { whyNotEditable } from "./edits";
 import { whyNotSteering } from "./run";
 import type { State } from "./state";
@@ -61,12 +61,19 @@ export const floored = (fraction: number): number => (fraction >= 1 ? 1 : Math.f
 /** The part of what was refused that would pass, where it is told and worth asking for; else null. */
 export const passingPart = (fraction: number | null | undefined): number | null => (typeof fraction === "number" && fraction > 0.001 ? fraction : null);
 
-/** An open boundary that would move, in words; empty where none does. */
+/** An open boundary that would move, or may, in words; empty where none does. */
 export function openBoundaryWarning(state: State): string {
   const [first, ...more] = openBoundariesMoved(state).sort((a, b) => b.by - a.by);
-  if (!first) return "";
+  if (!first) return unknownBoundaries(state);
   const others = more.length === 0 ? "" : more.length === 1 ? `, and ${more[0]!.name} too` : `, and ${more.length} others too`;
   return `${first.name} (${first.condition}) would move by ${digits(first.by, 3)}, ${digits(100 * first.part, 2)} % of the size${others}.`;
+}
+
+function unknownBoundaries(state: State): string {
+  const [first, ...more] = openBoundariesUnknown(state);
+  if (first === undefined) return "";
+  const others = more.length === 0 ? "" : more.length === 1 ? ` or ${more[0]!}` : ` or one of ${more.length} others`;
+  return `Whether ${first}${others} moves is not known${state.preview.state === "waiting" ? " yet" : ""}.`;
 }
 
 export const NOTHING_ASKED = "Nothing is asked for yet: choose a handle and change a value, or drag in the picture.";

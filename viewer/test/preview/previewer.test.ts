@@ -108,6 +108,21 @@ describe("what is seen of a shape while a hand makes it", () => {
     expect([ghost.coordinates?.[0], broken(), made.store.state.preview.faults]).toEqual([3, [], ""]);
   });
 
+  it("moves what it moved, until the shape of another amount has come, and for all one knows anything by another handle", () => {
+    const known = (): unknown => [made.store.state.preview.state, made.store.state.preview.moved];
+    const ask = (by: number): void => made.store.dispatch({ type: "composed", key: "translate", values: { by: [by, 0, 0] }, step: "drag" });
+    ask(1);
+    expect(known()).toEqual(["waiting", null]);
+    drag(2);
+    expect(known()).toEqual(["waiting", null]);
+    StandIn.last.answer({ number: last("number"), points: new Float32Array(12), nodes: null, largest: 2, moved: [2, 0], size: 1, milliseconds: 1 });
+    expect(known()).toEqual(["shown", { wall: 2, throat: 0 }]);
+    ask(3);
+    expect(known()).toEqual(["waiting", { wall: 2, throat: 0 }]);
+    made.store.dispatch({ type: "part", feature: "wall", part: "fixed" });
+    expect(known()).toEqual(["waiting", null]);
+  });
+
   it("begins sound again after what was broken is given up", () => {
     drag(1);
     judge(1);

@@ -44,6 +44,31 @@ describe("open boundaries", () => {
     expect(openBoundaryWarning(store.state)).toBe("outlet (outflow) would move by 0.021, 1.1 % of the size.");
     expect(applyButton(store.state)).toEqual({ label: "Apply anyway", why: "", isAnyway: true });
   });
+
+  it("are said to move as they did before, while what is composed is previewed again", () => {
+    const { store } = composed({ features: FEATURES });
+    store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "waiting", largest: 0.5, size: 2, moved: { outlet: 0.021 } } });
+    expect([openBoundaryWarning(store.state), applyButton(store.state).label]).toEqual(["outlet (outflow) would move by 0.021, 1.1 % of the size.", "Apply anyway"]);
+    store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state: "waiting", largest: 0.5, size: 2, moved: { outlet: 0 } } });
+    expect([openBoundaryWarning(store.state), applyButton(store.state).label]).toEqual(["", "Apply"]);
+  });
+
+  it("that are not held do not move without a word where no preview says how far", () => {
+    const { store } = composed({ features: FEATURES });
+    const said = (state: "waiting" | "failed" | "none"): string[] => {
+      store.dispatch({ type: "preview", preview: { ...NO_PREVIEW, state } });
+      return [openBoundaryWarning(store.state), applyButton(store.state).label];
+    };
+    expect([said("waiting"), said("failed")]).toEqual([["", "Apply"], ["", "Apply"]]);
+    store.dispatch({ type: "part", feature: "inlet", part: null });
+    expect(said("waiting")).toEqual(["Whether inlet moves is not known yet.", "Apply anyway"]);
+    expect(said("failed")).toEqual(["Whether inlet moves is not known.", "Apply anyway"]);
+    store.dispatch({ type: "part", feature: "outlet", part: "handle" });
+    expect(said("failed")[0]).toBe("Whether inlet or outlet moves is not known.");
+    // There may be no skeleton, too, while nothing is asked for.
+    store.dispatch({ type: "cleared" });
+    expect(said("failed")).toEqual(["", "Apply"]);
+  });
 });
 
 describe("the values of parameters", () => {
