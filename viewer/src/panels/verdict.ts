@@ -6,6 +6,7 @@ import type { Commands } from "../store/commands";
 import type { Values } from "../form/schema";
 import { asksNothing, isDivisible, isObject, sameFields, wholeOf } from "../store/draft";
 import type { State } from "../store/state";
+import { sameJson } from "../store/store";
 import type { Store } from "../store/store";
 import { applyButton, floored, forecastLine, openBoundaryWarning, percent, previewLine, remedies } from "../store/verdict";
 import type { Line } from "../store/verdict";
@@ -14,8 +15,8 @@ export class VerdictPanel {
   private readonly slider = part("amount") as HTMLInputElement;
   /** The part of the whole amount up to which the forecast has let it pass. */
   private limit = 1;
-  /** The whole amount that `limit` is of. */
-  private whole: Values | null = null;
+  /** What `limit` is of: the whole amount, and all else that a forecast depends on. */
+  private limited: { whole: Values; rest: readonly unknown[] } | null = null;
 
   /** `show` takes the camera to a place. `focusProblem` puts the focus where something is wrong. */
   constructor(
@@ -101,8 +102,11 @@ export class VerdictPanel {
   private showAmount(state: State): void {
     const { amount } = state.draft;
     const whole = wholeOf(state);
-    if (this.whole === null || !sameFields(whole, this.whole)) this.limit = 1;
-    this.whole = whole;
+    const { key, updating, settings, remedy } = state.draft;
+    const rest = [key, updating, settings, remedy, state.selection.parts, state.hello?.stack];
+    const isSame = this.limited !== null && sameFields(whole, this.limited.whole) && rest.every((value, i) => sameJson(value, this.limited!.rest[i]));
+    if (!isSame) this.limit = 1;
+    this.limited = { whole, rest };
     this.limit = Math.min(this.limit, this.allowed(state));
     const shown = (amount !== null || state.draft.updating !== null || !asksNothing(state)) && state.draft.problems.length === 0 && isDivisible(state);
     part("amount-row").hidden = !shown;

@@ -29,8 +29,10 @@ const NOBODY: Pick<State, "people" | "followedBy" | "following"> = { people: [],
 export function reduce(state: State, action: Action): State {
   const before = wishedOrder(state);
   const next = withKeptDraft(after(state, action));
-  // What was told of one order says nothing of another.
-  return next.forecast !== NO_FORECAST && !sameJson(wishedOrder(next), before) ? { ...next, forecast: NO_FORECAST } : next;
+  if (next.forecast === NO_FORECAST) return next;
+  // What was told of one order says nothing of another, nor of the same one on another stack.
+  const isSame = sameJson(wishedOrder(next), before) && sameJson(next.hello?.stack, state.hello?.stack);
+  return isSame ? next : { ...next, forecast: NO_FORECAST };
 }
 
 function after(state: State, action: Action): State {

@@ -59,6 +59,36 @@ describe("the foot of the form", () => {
     expect(z()).toBe(0.9);
   });
 
+  it("has a slider that goes all the way again once what was refused is another order, or starts from another shape", () => {
+    const { store } = made;
+    const refused = (fraction: number): string => {
+      store.dispatch({ type: "forecast told", answer: { ...REFUSED, fraction } });
+      return at("amount-text").textContent;
+    };
+    const settings = { ...store.state.draft.settings, guard: { min_scaled_jacobian: 0.01 } };
+    const changes: [string, () => void][] = [
+      ["the handle", () => store.dispatch({ type: "part", feature: "wall", part: "handle" })],
+      ["what is held", () => store.dispatch({ type: "part", feature: "inlet", part: "fixed" })],
+      ["the guard", () => store.dispatch({ type: "form read", key: "scale_direction", body: { ...bodyOf(store.state.draft) }, settings, problems: [], step: "input guard" })],
+      ["Untangle", () => at("untangle").click()],
+      ["the stack", () => store.dispatch({ type: "stack", edits: [{ translate: { features: ["wall"], by: [1, 0, 0] } }], undoable: 1 })],
+    ];
+    for (const [what, change] of changes) {
+      expect(refused(0.479), what).toBe("100 % of 47 %");
+      change();
+      expect(at("amount-text").textContent, what).toBe("100 %");
+    }
+    refused(0);
+    store.dispatch({ type: "part", feature: "outlet", part: "fixed" });
+    at("amount").value = "60";
+    at("amount").dispatchEvent(new Event("input"));
+    expect(at("amount-text").textContent).toBe("60 %");
+    // What is only read again, or told again, is the same.
+    refused(0.5);
+    made.greet({ stack: structuredClone(store.state.hello!.stack) });
+    expect(at("amount-text").textContent).toBe("60 % of 30 %");
+  });
+
   it("does not look through the faces of a region at what is nothing to it", () => {
     let looked = 0;
     const faces = Object.assign([1, 2, 3], { toJSON: () => { looked++; return [1, 2, 3]; } });
