@@ -6,7 +6,7 @@ import type { Draft, Part, State } from "./state";
 import { sameJson } from "./store";
 
 /** The edit that is composed with what it is composed of; `before` is the edit of the stack that it changes, as that was. */
-export interface KeptDraft extends Pick<Draft, "key" | "settings" | "remedy" | "updating" | "amount"> {
+export interface KeptDraft extends Pick<Draft, "key" | "settings" | "remedy" | "updating" | "partsBefore" | "amount"> {
   body: Draft["settings"]; before: Json; parts: Readonly<Record<string, Part>>;
 }
 
@@ -22,9 +22,9 @@ export function draftToKeep(state: State): KeptForm | null {
   // Until the edits of the run have come, what was kept before is not in the form.
   if (!saysSomething(state) && state.keptDraft) return state.keptDraft;
   if (!state.form) return null;
-  const { key, settings, remedy, updating, amount } = state.draft;
+  const { key, settings, remedy, updating, partsBefore, amount } = state.draft;
   const before = updating === null ? null : state.hello?.stack[updating] ?? null;
-  const kept = { key, body: bodyOf(state.draft), settings, remedy, updating, amount, before, parts: state.selection.parts };
+  const kept = { key, body: bodyOf(state.draft), settings, remedy, updating, partsBefore, amount, before, parts: state.selection.parts };
   return JSON.stringify(kept).length <= LONGEST ? kept : saysSomething(state) ? TOO_LONG : null;
 }
 
@@ -32,12 +32,13 @@ export function draftToKeep(state: State): KeptForm | null {
 export function readDraft(kept: unknown): KeptForm | null {
   if (kept === TOO_LONG) return kept;
   if (!isObject(kept)) return null;
-  const { key, body, settings, remedy, updating, amount, before, parts } = kept;
+  const { key, body, settings, remedy, updating, partsBefore, amount, before, parts } = kept;
   const isAmount = amount === null || (isObject(amount) && isObject(amount.whole) && typeof amount.fraction === "number" && amount.fraction >= 0 && amount.fraction <= 1);
+  const areParts = (some: Json | undefined): boolean => isObject(some) && Object.values(some).every((part) => part === "handle" || part === "fixed");
   const isSound = (key === null || typeof key === "string") && isObject(body) && isObject(settings) && isObject(remedy) && isAmount
     && (updating === null || (Number.isInteger(updating) && (updating as number) >= 0)) && before !== undefined
-    && isObject(parts) && Object.values(parts).every((part) => part === "handle" || part === "fixed");
-  return isSound ? { key, body, settings, remedy, updating, amount, before, parts } as unknown as KeptDraft : null;
+    && areParts(parts) && (partsBefore === null || areParts(partsBefore));
+  return isSound ? { key, body, settings, remedy, updating, partsBefore, amount, before, parts } as unknown as KeptDraft : null;
 }
 
 /** Whether the run has told all that a draft can be of: its features, its edits and its form. */
@@ -52,10 +53,10 @@ export function whyNotFitting(state: State, { updating, before, parts }: KeptDra
 }
 
 /** The draft that was kept. Of the other edits nothing is. */
-export function draftOf(state: State, { key, body, settings, remedy, updating, amount }: KeptDraft): Draft {
+export function draftOf(state: State, { key, body, settings, remedy, updating, partsBefore, amount }: KeptDraft): Draft {
   const known = own(state.draft.bodies, key ?? "") ?? {};
   const bodies = key === null ? state.draft.bodies : { ...state.draft.bodies, [key]: { ...known, ...body } };
-  return { ...state.draft, key: key ?? state.draft.key, bodies, settings, remedy, updating, amount, problems: [] };
+  return { ...state.draft, key: key ?? state.draft.key, bodies, settings, remedy, updating, partsBefore, amount, problems: [] };
 }
 
 /** Whether a draft says something that would be lost with it. */

@@ -181,11 +181,12 @@ function withStack(state: State, edits: Json[], undoable: number | undefined): S
   return state.hello ? withoutLostEdit(state, { ...state, hello: { ...state.hello, stack: edits, isAwaitingEdits: false, undoable } }) : state;
 }
 
-/** The next state, in which an edit that is not there any more is not changed any more. */
+/** The next state, in which an edit that is not there any more is not changed any more, nor by a step back or forward. */
 function withoutLostEdit(state: State, next: State): State {
-  const { updating } = state.draft;
-  const isGone = updating !== null && !sameJson(next.hello?.stack[updating], state.hello?.stack[updating]);
-  return isGone ? cleared(next) : next;
+  const isThere = ({ updating }: Pick<Draft, "updating">): boolean => updating === null || sameJson(next.hello?.stack[updating], state.hello?.stack[updating]);
+  if (!isThere(state.draft)) return cleared(next);
+  const { past, future } = next.draft;
+  return [...past, ...future].every(isThere) ? next : { ...next, draft: { ...next.draft, past: past.filter(isThere), future: future.filter(isThere) } };
 }
 
 function viewsOf(state: State, { views, fields }: Hello): Pick<State, "looks" | "chosenView"> {
@@ -229,8 +230,8 @@ function withPart(parts: State["selection"]["parts"], feature: string, part: Par
   return part === null ? rest : { ...rest, [feature]: part };
 }
 
-function composed({ draft: { key, bodies, settings, remedy, updating }, selection: { parts } }: State): Composed {
-  return { key, bodies, settings, remedy, parts, updating };
+function composed({ draft: { key, bodies, settings, remedy, updating, partsBefore }, selection: { parts } }: State): Composed {
+  return { key, bodies, settings, remedy, parts, updating, partsBefore };
 }
 
 /** The state with another draft, as a step that can be taken back; all of one step together. */
@@ -257,11 +258,12 @@ function steppedForward(state: State): State {
   return to ? brought(state, to, [...past, composed(state)], future.slice(0, -1)) : state;
 }
 
-/** The form asks for nothing; a handle stays chosen, so that it can be worked on. */
+/** The form asks for nothing; a handle stays chosen, so that it can be worked on. What was loaded takes its own with it: what flows in and out is held again. */
 function cleared(state: State): State {
   const bodies = Object.fromEntries((state.form?.edits ?? []).map((edit) => [edit.key, edit.neutral]));
-  const draft = { ...state.draft, bodies, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] };
-  return { ...state, refusal: "", draft, forecast: NO_FORECAST };
+  const draft = { ...state.draft, bodies, remedy: {}, problems: [], updating: null, partsBefore: null, amount: null, step: null, past: [], future: [] };
+  const selection = { ...state.selection, parts: state.draft.partsBefore ?? state.selection.parts };
+  return { ...state, refusal: "", draft, selection, forecast: NO_FORECAST };
 }
 
 /** What the form is to hold of an edit; null where it has no form for it. */
@@ -278,13 +280,18 @@ function inForm(state: State, edit: Json | undefined): { key: string; body: Valu
   return { key: kind.key, body: { ...kind.neutral, ...fields }, parts: Object.fromEntries(parts) };
 }
 
+/** The state with something in the form that is no more of what stood there, as a step that can be taken back. */
+function withLoaded(state: State, { key, body, parts }: NonNullable<ReturnType<typeof inForm>>, more: Partial<Draft>, step: string): State {
+  const { draft } = cleared(state);
+  const { past, step: before, partsBefore } = state.draft;
+  const next = { ...draft, key, bodies: { ...draft.bodies, [key]: body }, ...more, partsBefore: partsBefore ?? state.selection.parts, past, step: before };
+  return { ...stepped({ ...state, refusal: "" }, next, step), selection: { ...state.selection, parts } };
+}
+
 /** An edit of the stack in the form, to be changed. */
 function withEditLoaded(state: State, index: number): State {
   const held = inForm(state, state.hello?.stack[index]);
-  if (!held) return state;
-  const before = cleared(state);
-  const draft = { ...before.draft, key: held.key, bodies: { ...before.draft.bodies, [held.key]: held.body }, updating: index };
-  return { ...before, draft, selection: { ...state.selection, parts: held.parts } };
+  return held ? withLoaded(state, held, { updating: index }, `load ${index}`) : state;
 }
 
 /** What an order has asked for in the form again, as a step that can be taken back. */
@@ -293,15 +300,12 @@ function withOrderTakenUp(state: State, id: string, fraction: number): State {
   const held = order && inForm(state, order.edit);
   if (!held) return state;
   const { guard, ...settings } = order.settings;
-  const { draft } = cleared(state);
   // The guard that is set in the form stays for the orders that follow; another one was for this edit alone.
   const { guard: guardOfForm } = state.draft.settings;
-  const next = {
-    ...draft, key: held.key, bodies: { ...draft.bodies, [held.key]: held.body }, updating: order.updating,
-    settings: guardOfForm === undefined ? settings : { ...settings, guard: guardOfForm }, remedy: guard === undefined || sameJson(guard, guardOfForm) ? {} : { guard },
-    past: state.draft.past, step: state.draft.step,
-  };
-  const taken = { ...stepped({ ...state, refusal: "" }, next, `order ${id}`), selection: { ...state.selection, parts: held.parts } };
+  const taken = withLoaded(state, held, {
+    updating: order.updating, settings: guardOfForm === undefined ? settings : { ...settings, guard: guardOfForm },
+    remedy: guard === undefined || sameJson(guard, guardOfForm) ? {} : { guard },
+  }, `order ${id}`);
   return fraction < 1 ? withAmount(taken, fraction) : taken;
 }
 

@@ -16,7 +16,7 @@ export interface SelectionState { parts: Readonly<Record<string, Part>>; hovered
 export interface Problem { field: string; text: string }
 
 /** What a step back in the form brings back. */
-export interface Composed extends Pick<Draft, "key" | "bodies" | "settings" | "remedy" | "updating"> { parts: Readonly<Record<string, Part>> }
+export interface Composed extends Pick<Draft, "key" | "bodies" | "settings" | "remedy" | "updating" | "partsBefore"> { parts: Readonly<Record<string, Part>> }
 
 /** What stands in the form. */
 export interface Draft {
@@ -31,6 +31,8 @@ export interface Draft {
   problems: readonly Problem[];
   /** The edit of the stack that is being changed, counted from 0; null for a new one. */
   updating: number | null;
+  /** What was chosen before an edit or an order was loaded: it is chosen again once that is given or given up. Null where none is loaded. */
+  partsBefore: Readonly<Record<string, Part>> | null;
   /** The fields at their full amount, and the part of it that stands in the form, from 0 to 1. */
   amount: { whole: Values; fraction: number } | null;
   /** The step that is under way: what belongs to one gesture or one field is taken back at once. */
@@ -134,7 +136,7 @@ export const INITIAL: State = {
   carried: {}, looks: {}, chosenView: null, coarser: {},
   selection: { parts: {}, hovered: null },
   form: null,
-  draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, amount: null, step: null, past: [], future: [] },
+  draft: { key: null, bodies: {}, settings: {}, remedy: {}, problems: [], updating: null, partsBefore: null, amount: null, step: null, past: [], future: [] },
   keptDraft: null,
   orders: [], dismissed: [], undone: [],
   preview: NO_PREVIEW, forecast: NO_FORECAST,

@@ -48,6 +48,7 @@ describe("what stands in the form", () => {
 
   it("is the change of an earlier edit, where that is as it was", () => {
     const { store } = page({ stack: STACK });
+    store.dispatch({ type: "part", feature: "throat", part: "handle" });
     store.dispatch({ type: "edit loaded", index: 0 });
     store.dispatch({ type: "composed", key: "translate", values: { by: [2, 0, 0] }, step: "typed" });
     const draft = draftToKeep(store.state)!;
@@ -55,6 +56,8 @@ describe("what stands in the form", () => {
     const same = reduce(reduce(again(draft), { type: "stack", edits: STACK, undoable: 1 }), SCHEMA);
     expect(wishedOrder(same)).toEqual(order);
     expect(same.draft.updating).toBe(0);
+    // What was chosen before it is chosen again after it.
+    expect([same.selection.parts, reduce(same, { type: "cleared" }).selection.parts]).toEqual([{ wall: "handle", inlet: "fixed" }, { throat: "handle" }]);
     const other = reduce(reduce(again(draft), { type: "stack", edits: [], undoable: 0 }), SCHEMA);
     expect([asksNothing(other), other.draft.updating, other.refusal]).toEqual([true, null, "What stood in the form before the page was loaded again is gone: the edit that it changes is another one now."]);
   });

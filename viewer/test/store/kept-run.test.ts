@@ -15,7 +15,7 @@ describe("what is kept of a run over a reload", () => {
   const PIN = { name: "probe 2", view: "cut", point: [1, 0.5, 0] as [number, number, number] };
   const CAMERA = { position: [0, 0, 3], focalPoint: [0, 0, 0], viewUp: [0, 1, 0], parallel: true, parallelScale: 2, viewAngle: 30, middle: [0.1, 0] } as KeptOfRun["camera"];
   const DRAFT: KeptDraft = {
-    key: "translate", body: { by: [1, 0, 0] }, settings: {}, remedy: {}, updating: 1, amount: { whole: { by: [2, 0, 0] }, fraction: 0.5 },
+    key: "translate", body: { by: [1, 0, 0] }, settings: {}, remedy: {}, updating: 1, partsBefore: null, amount: { whole: { by: [2, 0, 0] }, fraction: 0.5 },
     before: { translate: {} }, parts: { wall: "handle", inlet: "fixed" },
   };
   const NOTHING: KeptOfRun = { pins: [], history: null, isWorstOwn: false, camera: null, isParallel: false, isSkeletonShown: false, isCompared: false, chosenView: null, draft: null, dismissed: [] };

@@ -212,6 +212,45 @@ describe("an earlier edit", () => {
     expect(asksNothing(store.state)).toBe(true);
   });
 
+  it("takes the place of what stood in the form as a step that can be taken back", () => {
+    const { store, greet } = composed({ stack });
+    const before = wishedOrder(store.state);
+    const composing = (): unknown => [store.state.draft.updating, chosen(store.state, "handle"), wishedOrder(store.state)];
+    store.dispatch({ type: "edit loaded", index: 1 });
+    expect(composing()).toEqual([1, ["wall"], null]);
+    store.dispatch({ type: "edit loaded", index: 0 });
+    store.dispatch({ type: "step back" });
+    expect(composing()).toEqual([1, ["wall"], null]);
+    store.dispatch({ type: "step back" });
+    expect(composing()).toEqual([null, ["throat"], before]);
+    store.dispatch({ type: "step forward" });
+    expect(composing()).toEqual([1, ["wall"], null]);
+    // No step leads to an edit that is not there any more.
+    store.dispatch({ type: "step forward" });
+    greet({ stack: [stack[0]!] });
+    store.dispatch({ type: "step back" });
+    expect(composing()).toEqual([null, ["throat"], before]);
+  });
+
+  it("leaves what was chosen before it chosen, and what flows in and out held, once it is given or given up", () => {
+    const { store, commands } = page({ stack, features: [...FEATURES, feature("wall")] });
+    const chosenNow = (): unknown => [chosen(store.state, "handle"), chosen(store.state, "fixed")];
+    store.dispatch({ type: "part", feature: "throat", part: "handle" });
+    for (const end of [() => store.dispatch({ type: "cleared" }), () => commands.apply()]) {
+      store.dispatch({ type: "edit loaded", index: 1 });
+      store.dispatch({ type: "edit loaded", index: 0 });
+      store.dispatch({ type: "part", feature: "walls", part: "handle" });
+      store.dispatch({ type: "composed", key: "scale_direction", values: { factors: [1, 1, 0.4] }, step: "typed" });
+      expect(chosenNow()).toEqual([["walls", "throat"], []]);
+      end();
+      expect(chosenNow()).toEqual([["throat"], ["inlet", "outlet"]]);
+    }
+    // What is chosen for a new edit stays for the next.
+    store.dispatch({ type: "part", feature: "walls", part: "handle" });
+    store.dispatch({ type: "cleared" });
+    expect(chosenNow()).toEqual([["walls", "throat"], ["inlet", "outlet"]]);
+  });
+
   it("is changed in part from what it is, as far as that passes", () => {
     const { store } = page({ stack: [...stack, { skeleton: { at: [0, 0, 1], by: [1, 0, 0], fixed: [], skinning: "linear" } }] });
     store.dispatch({ type: "edit loaded", index: 0 });
