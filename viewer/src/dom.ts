@@ -37,6 +37,13 @@ export function write(target: Element, text: string): void {
   if (target.textContent !== text) target.textContent = text;
 }
 
+/** Gives an element these children. Those that it has already stay in the document: a press on one goes on, and so does a drag. */
+export function arrange(parent: Element, children: readonly Element[]): void {
+  const wanted = new Set<Element>(children);
+  for (const child of [...parent.childNodes]) if (!wanted.has(child as Element)) child.remove();
+  children.forEach((child, i) => { if (parent.children[i] !== child) parent.insertBefore(child, parent.children[i] ?? null); });
+}
+
 /** Marks an input as wrong, and says why under the pointer; empty where nothing is wrong with it, and it has its hint. */
 export function markWrong(input: HTMLElement, why: string, hint = ""): void {
   input.setAttribute("aria-invalid", String(why !== ""));

@@ -3,7 +3,7 @@
  * the form; every change here is an order of the whole new stack.
  */
 import type { Json } from "../connection/protocol";
-import { element, part, textField, write } from "../dom";
+import { arrange, element, part, textField, write } from "../dom";
 import { isMuted, titleOf } from "../form/describe";
 import { digits, seconds } from "../number";
 import type { Action } from "../store/actions";
@@ -24,6 +24,11 @@ const PHASES: Record<OrderPhase | Withdrawal["how"], string> = {
   cancelled: "cancelled", replaced: "replaced",
 };
 
+/** A row of a list, what it is of, and what writes into it all that changes while it is of the same. */
+interface Row { of: readonly unknown[]; node: HTMLElement; show(order: OrderRecord | null): void }
+type Rows = ReadonlyMap<string, Row>;
+interface WantedRow { key: string; of: readonly unknown[]; order: OrderRecord | null; make(): Omit<Row, "of"> }
+
 export class EditsPanel {
   private readonly list = part("stack");
   private readonly pending = part("pending");
@@ -35,6 +40,7 @@ export class EditsPanel {
   /** The edit whose name is being typed. */
   private renaming: number | null = null;
   private announced = new Map<string, OrderPhase>();
+  private readonly rows: { list: Rows; pending: Rows; history: Rows } = { list: new Map(), pending: new Map(), history: new Map() };
 
   constructor(private readonly store: Store<State, Action>, private readonly commands: Commands) {
     const seen = (state: State): unknown => [state.hello?.stack, state.orders, state.dismissed, state.draft.updating, whyNotEditable(state), state.form, state.people];
@@ -59,14 +65,23 @@ export class EditsPanel {
     const by = provenance(state.orders, this.stack);
     // While a name is being typed the list stays: a field that is taken away would end the typing half-way.
     const isTyping = this.renaming !== null && this.list.contains(textField(document.activeElement));
-    if (!isTyping) this.list.replaceChildren(...this.stack.map((edit, i) => this.row(edit, i, by[i] ?? null)));
+    if (!isTyping) {
+      this.rows.list = put(this.list, this.rows.list, this.stack.map((edit, i) => {
+        const title = titleOf(edit, state.form);
+        return { key: String(i), of: [edit, title, this.renaming === i], order: by[i] ?? null, make: () => this.row(edit, i, title) };
+      }));
+    }
     this.markDrag();
     part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
-    this.pending.replaceChildren(...state.orders.filter(isPending).map((order) => this.pendingRow(order)),
-      ...state.orders.filter((order) => isRefused(order) && !state.dismissed.includes(order.id)).slice(-REFUSED_SHOWN).map((order) => this.refusedRow(order)));
+    this.rows.pending = put(this.pending, this.rows.pending, [
+      ...state.orders.filter(isPending).map((order) => ({ key: order.id, of: ["pending"], order, make: () => this.pendingRow(order) })),
+      ...state.orders.filter((order) => isRefused(order) && !state.dismissed.includes(order.id)).slice(-REFUSED_SHOWN)
+        .map((order) => ({ key: order.id, of: ["refused", order, this.stack, state.form, state.people], order, make: () => unchanging(this.refusedRow(order)) })),
+    ]);
     part("history").hidden = state.orders.length === 0;
     write(part("history-title"), `Everything that happened (${state.orders.length})`);
-    this.history.replaceChildren(...[...state.orders].reverse().map((order) => historyRow(order, state)));
+    this.rows.history = put(this.history, this.rows.history, [...state.orders].reverse()
+      .map((order) => ({ key: order.id, of: [order, state.people], order, make: () => unchanging(historyRow(order, state)) })));
     if (focus && !isTyping) (focus() ?? part("undo")).focus();
   }
 
@@ -103,29 +118,27 @@ export class EditsPanel {
     return () => find(index) ?? find(last);
   }
 
-  private row(edit: Json, index: number, order: OrderRecord | null): HTMLElement {
-    const { state } = this.store;
-    const why = whyNotEditable(state);
-    const title = titleOf(edit, state.form);
+  private row(edit: Json, index: number, title: string): Omit<Row, "of"> {
     const muted = isMuted(edit);
-    const act = (name: string, sign: string, label: string, act: () => void): HTMLElement => element("button", {
-      type: "button", class: "icon", "data-act": name, title: why || label, "aria-label": `${label}: ${title}`, "aria-disabled": why !== "" ? "true" : "false",
-      onclick: () => { if (whyNotEditable(this.store.state) === "") act(); },
-    }, sign);
+    const button = (name: string, kind: string, label: string, spoken: string, sign: string): HTMLElement =>
+      element("button", { type: "button", class: kind, "data-act": name, "data-label": label, "aria-label": `${spoken}: ${title}` }, sign);
+    const act = (name: string, sign: string, label: string, act: () => void): HTMLElement => {
+      const made = button(name, "icon", label, label, sign);
+      made.addEventListener("click", () => { if (whyNotEditable(this.store.state) === "") act(); });
+      return made;
+    };
+    const detail = element("span", { class: "detail" });
     const text = this.renaming === index ? this.nameInput(edit, index) : element("button", {
-      type: "button", class: "load", "data-act": "load", title: "Load its values into the form, to change it", "aria-pressed": String(state.draft.updating === index),
+      type: "button", class: "load", "data-act": "load", title: "Load its values into the form, to change it",
       onclick: () => this.store.dispatch({ type: "edit loaded", index }),
       onkeydown: (event) => this.key(event as KeyboardEvent, index),
-    }, element("span", { class: "title" }, title), element("span", { class: "detail" }, muted ? "muted" : order ? outcomeOf(order) : ""));
-    return element("li", {
-      "data-edit": index, "data-muted": String(muted), "data-updating": String(state.draft.updating === index), "data-status": order?.not_followed ? "rejected" : "applied",
-    }, element("button", {
-      type: "button", class: "grip", tabindex: -1, "data-act": "move", title: why || "Drag to reorder; with the focus on the row, Alt with the arrow keys does the same",
-      "aria-label": `Move: ${title}`, "aria-disabled": why !== "" ? "true" : "false", onpointerdown: (event) => this.take(event as PointerEvent, index),
-      onkeydown: (event) => this.key(event as KeyboardEvent, index),
-    }, "⠿"),
-      element("span", { class: "number", "aria-hidden": "true" }, String(index + 1)), text,
-      act("mute", muted ? "○" : "●", muted ? "Unmute" : "Mute", () => this.commands.setStack(toggleMute(this.stack, index))),
+    }, element("span", { class: "title" }, title), detail);
+    const grip = button("move", "grip", "Drag to reorder; with the focus on the row, Alt with the arrow keys does the same", "Move", "⠿");
+    grip.tabIndex = -1;
+    grip.addEventListener("pointerdown", (event) => this.take(event, index));
+    grip.addEventListener("keydown", (event) => this.key(event, index));
+    const changing = [
+      grip, act("mute", muted ? "○" : "●", muted ? "Unmute" : "Mute", () => this.commands.setStack(toggleMute(this.stack, index))),
       act("rename", "✎", "Rename", () => {
         this.renaming = index;
         this.show();
@@ -133,7 +146,25 @@ export class EditsPanel {
         input?.focus();
         input?.select();
       }),
-      act("remove", "×", "Delete", () => this.commands.setStack(remove(this.stack, index))));
+      act("remove", "×", "Delete", () => this.commands.setStack(remove(this.stack, index))),
+    ];
+    const node = element("li", { "data-edit": index, "data-muted": String(muted) },
+      grip, element("span", { class: "number", "aria-hidden": "true" }, String(index + 1)), text, ...changing.slice(1));
+    return {
+      node, show: (order) => {
+        const { state } = this.store;
+        const why = whyNotEditable(state);
+        const isUpdating = String(state.draft.updating === index);
+        for (const button of changing) {
+          button.title = why || button.dataset.label!;
+          button.setAttribute("aria-disabled", String(why !== ""));
+        }
+        if (text.tagName === "BUTTON") text.setAttribute("aria-pressed", isUpdating);
+        node.dataset.updating = isUpdating;
+        node.dataset.status = order?.not_followed ? "rejected" : "applied";
+        write(detail, muted ? "muted" : order ? outcomeOf(order) : "");
+      },
+    };
   }
 
   private nameInput(edit: Json, index: number): HTMLElement {
@@ -225,16 +256,24 @@ export class EditsPanel {
     }
   }
 
-  private pendingRow(order: OrderRecord): HTMLElement {
-    const steering = whyNotSteering(this.store.state) === "";
-    const fraction = order.shapes ? (order.shape ?? 0) / order.shapes : 0;
-    const done = element("div");
-    if (order.status === "applying") done.style.width = `${100 * fraction}%`;
-    const bar = element("div", { class: order.status === "applying" ? "bar" : "bar indefinite" }, done);
-    return element("li", { "data-order": order.id, "data-status": order.status },
-      element("div", { class: "line" }, element("span", { class: "title" }, order.text), element("span", { class: "chip" }, phaseOf(order)),
-        steering && isCancellable(order) ? element("button", { type: "button", class: "cancel", "data-act": "cancel", onclick: () => this.commands.cancel(order.id) }, "Cancel") : null),
-      bar, element("div", { class: "detail" }, detailOf(order, this.store.state)));
+  private pendingRow({ id }: OrderRecord): Omit<Row, "of"> {
+    const [title, chip, detail, done] = [element("span", { class: "title" }), element("span", { class: "chip" }), element("div", { class: "detail" }), element("div")];
+    const [line, bar] = [element("div", { class: "line" }, title, chip), element("div", {}, done)];
+    const cancel = element("button", { type: "button", class: "cancel", "data-act": "cancel", onclick: () => this.commands.cancel(id) }, "Cancel");
+    const node = element("li", { "data-order": id }, line, bar, detail);
+    return {
+      node, show: (order) => {
+        if (!order) return;
+        const isApplying = order.status === "applying";
+        node.dataset.status = order.status;
+        write(title, order.text);
+        write(chip, phaseOf(order));
+        arrange(line, whyNotSteering(this.store.state) === "" && isCancellable(order) ? [title, chip, cancel] : [title, chip]);
+        bar.className = isApplying ? "bar" : "bar indefinite";
+        done.style.width = isApplying ? `${order.shapes ? (100 * (order.shape ?? 0)) / order.shapes : 0}%` : "";
+        write(detail, detailOf(order, this.store.state));
+      },
+    };
   }
 
   private refusedRow(order: OrderRecord): HTMLElement {
@@ -294,6 +333,22 @@ export class EditsPanel {
     if (this.announced.size > 1000) this.announced = new Map(orders.map(({ id, status }) => [id, status]));
   }
 }
+
+/** Puts rows into a list. One that is of the same as before stays, so that a press on it is not lost while orders go on. */
+function put(list: HTMLElement, before: Rows, wanted: readonly WantedRow[]): Rows {
+  const rows = new Map(wanted.map(({ key, of, order, make }): [string, Row] => {
+    const known = before.get(key);
+    const isSame = known?.of.length === of.length && of.every((part, i) => sameJson(part, known.of[i]));
+    const row = { ...(isSame ? known : make()), of };
+    row.show(order);
+    return [key, row];
+  }));
+  arrange(list, [...rows.values()].map(({ node }) => node));
+  return rows;
+}
+
+/** A row into which nothing is written later. */
+const unchanging = (node: HTMLElement): Omit<Row, "of"> => ({ node, show: () => undefined });
 
 function undoState(state: State): { undo: boolean; redo: boolean; why: string; composing: boolean } {
   return { undo: undoable(state) > 0, redo: isRedoable(state), why: whyNotEditable(state), composing: state.draft.past.length > 0 };

@@ -57,6 +57,40 @@ describe("the list of edits", () => {
     expect(document.activeElement).toBe(button(1, "remove"));
   });
 
+  it("keeps a press on a row, and on the way to take an order back, while orders go on", () => {
+    const order = (more: Partial<OrderStatus> & Pick<OrderStatus, "status">): void => made.store.dispatch({ type: "order", status: { id: "o1", order: { edits: [shift(3)] }, ...more } });
+    /** A press over a change: as in a browser, what is clicked is what was pressed, if it has stayed. */
+    const press = (find: () => HTMLElement, change: () => void): void => {
+      const pressed = find();
+      const removed: Node[] = [];
+      const observer = new MutationObserver(() => undefined);
+      observer.observe(document.body, { childList: true, subtree: true });
+      pressed.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true }));
+      change();
+      for (const record of observer.takeRecords()) removed.push(...record.removedNodes);
+      observer.disconnect();
+      expect(find()).toBe(pressed);
+      // One that was taken away and put back is clicked no more either.
+      expect(removed.filter((node) => node.contains(pressed))).toEqual([]);
+      pressed.dispatchEvent(new PointerEvent("pointerup", { bubbles: true }));
+      pressed.click();
+    };
+    const cancel = (): HTMLElement => document.querySelector<HTMLElement>("#pending .cancel")!;
+    order({ status: "accepted" });
+    press(cancel, () => order({ status: "computing" }));
+    expect(made.sent.at(-1)).toMatchObject({ cancel: { order: "o1" } });
+    order({ status: "applying", shape: 1, shapes: 10 });
+    press(() => button(2, "load"), () => order({ status: "applying", shape: 2, shapes: 10 }));
+    expect(made.store.state.draft.updating).toBe(2);
+    expect([document.querySelector("#pending .detail")!.textContent, document.querySelector<HTMLElement>("#pending .bar div")!.style.width]).toEqual(["shape 2 of 10", "20%"]);
+    press(() => button(1, "remove"), () => order({ status: "applied" }));
+    expect(made.orders()).toEqual([{ stack: [stack[0], stack[2]] }]);
+    // Only the row whose edit is another one is made anew.
+    const before = [0, 1, 2].map((row) => button(row, "load"));
+    made.greet({ stack: [stack[0]!, shift(5), stack[2]!] });
+    expect([0, 1, 2].map((row) => button(row, "load") === before[row])).toEqual([true, false, true]);
+  });
+
   describe("are put in another sequence", () => {
     const at = (kind: string, row: number | null, on: EventTarget = window, pointerId = 1): void => {
       document.elementFromPoint = () => (row === null ? null : document.querySelector(`#stack [data-edit="${row}"] .title`));
