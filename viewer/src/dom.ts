@@ -44,6 +44,25 @@ export function arrange(parent: Element, children: readonly Element[]): void {
   children.forEach((child, i) => { if (parent.children[i] !== child) parent.insertBefore(child, parent.children[i] ?? null); });
 }
 
+/**
+ * Sees where the focus is in a list, and gives what puts it there again once the rows are made anew: on the same control of the same row, or of the
+ * row that has taken its place. Where there is none, `elsewhere` is called. A row is known by its key, a control by its `data-act`.
+ */
+export function holdFocus(list: HTMLElement, keyOf: (row: HTMLElement) => string | null | undefined, elsewhere: () => void): () => void {
+  const active = document.activeElement as HTMLElement | null;
+  if (!active || !list.contains(active)) return () => undefined;
+  const rows = (): HTMLElement[] => [...list.children] as HTMLElement[];
+  const at = rows().findIndex((row) => row.contains(active));
+  const key = at < 0 ? null : keyOf(rows()[at]!);
+  return () => {
+    const row = rows().find((candidate) => keyOf(candidate) === key) ?? rows()[Math.min(at, rows().length - 1)];
+    const controls = [...row?.querySelectorAll<HTMLElement>(":is(button, input):not(:disabled)") ?? []];
+    const again = controls.find(({ dataset }) => dataset.act === active.dataset.act) ?? controls[0];
+    if (again) again.focus();
+    else elsewhere();
+  };
+}
+
 /** Marks an input as wrong, and says why under the pointer; empty where nothing is wrong with it, and it has its hint. */
 export function markWrong(input: HTMLElement, why: string, hint = ""): void {
   input.setAttribute("aria-invalid", String(why !== ""));

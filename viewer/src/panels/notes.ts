@@ -1,6 +1,6 @@
 /** Notes that are pinned to a place and a cycle: pins in the picture, a list that flies there, and a form for another one. */
 import type { PinnedNote, Vector } from "../connection/protocol";
-import { element, part, write } from "../dom";
+import { element, holdFocus, part, write } from "../dom";
 import { digits } from "../number";
 import type { Marks } from "../picture/marks";
 import type { Action } from "../store/actions";
@@ -115,12 +115,12 @@ export class NotesPanel {
     part("notes-panel").hidden = !may && notes.length === 0;
     part("note-form").hidden = !may;
     const list = part("notes");
-    const held = list.contains(document.activeElement);
+    const focusAgain = holdFocus(list, ({ dataset }) => dataset.note, () => part("note-text").focus());
     list.replaceChildren(...notes.map(({ number, text, cycle, by }) => element("li", { "data-note": number },
       element("button", { type: "button", class: "load", title: isRecording ? "Show its place, and go to its cycle" : "Show its place" },
         element("span", { class: "title" }, text), element("span", { class: "detail" }, element("bdi", {}, by), ` · cycle ${cycle}`)),
       may ? element("button", { type: "button", class: "icon", "data-act": "remove", "aria-label": `Remove the note of ${by}: ${short(text)}` }, "×") : null)));
-    if (held) (list.querySelector<HTMLElement>("button") ?? part("note-text")).focus();
+    focusAgain();
     this.marks.set("notes", notes.map(({ text, at }) => ({ points: [at], label: short(text), kind: "note" as const })));
   }
 }

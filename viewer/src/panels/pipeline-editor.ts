@@ -1,6 +1,6 @@
 /** The editor of one pipeline: its text with the checker's marks, what stands at the cursor, and what the run says to it. */
 import type { Json } from "../connection/protocol";
-import { element, part, write } from "../dom";
+import { element, holdFocus, part, write } from "../dom";
 import type { Checker } from "../pipelines/checker";
 import type { PipelineEditor } from "../pipelines/editor";
 import { markOf, refusalMark } from "../pipelines/marks";
@@ -124,12 +124,14 @@ export class PipelineEditorPanel {
   /** Lists what is marked; `refusal` is what the run has said. */
   private showMarks(refusal: Mark | null, more: number): void {
     const list = part("pipeline-errors");
+    const focusAgain = holdFocus(list, (row) => row.querySelector(".title")?.textContent, () => this.editor?.focus());
     list.hidden = this.marks.length === 0;
     list.replaceChildren(...this.marks.map((mark) => element("li", mark.isWarning ? { class: "warning" } : {},
       element("button", { type: "button", class: "load", title: "Go there", onclick: () => this.editor?.goTo(mark.from, mark.to) },
         element("span", { class: "detail" }, `line ${mark.line}${mark === refusal ? " · the run" : mark.isWarning ? " · warning" : ""}`), element("span", { class: "title" }, mark.text)),
       mark.fix ? element("button", { type: "button", class: "small", "data-act": "fix", onclick: () => this.editor?.replace(mark.from, mark.to, mark.fix!.insert) }, `Use ${mark.fix.name}`) : null)),
     ...(more > 0 ? [element("li", { class: "hint" }, `and ${more} more`)] : []));
+    focusAgain();
   }
 
   /** Loads the editor where it is not there, and takes the cursor into it. */

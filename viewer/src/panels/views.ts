@@ -1,6 +1,6 @@
 /** The views that the simulation streams: which are seen, how opaque, and which one is being changed. */
 import type { ViewInformation } from "../connection/protocol";
-import { element, identifier, write } from "../dom";
+import { arrange, element, holdFocus, identifier, write } from "../dom";
 import { own } from "../own";
 import { LINE, WORST, sourceOf } from "../store/pipelines";
 import type { Action } from "../store/actions";
@@ -24,22 +24,29 @@ export class ViewList {
   }
 
   private list(views: readonly ViewInformation[]): void {
-    this.root.replaceChildren(...views.map((view) => this.row(view)));
-    if (views.length === 0) this.root.replaceChildren(element("p", { class: "hint" }, "No views are streamed."));
+    const focusAgain = holdFocus(this.root, ({ dataset }) => dataset.view, () => {
+      this.root.tabIndex = -1;
+      this.root.focus();
+    });
+    // A row that stays is not touched: its slider may be held.
+    const known = new Map([...this.root.querySelectorAll<HTMLElement>("[data-view]")].map((row) => [row.dataset.view, row]));
+    const rows = views.map((view) => known.get(view.name) ?? this.row(view));
+    arrange(this.root, rows.length > 0 ? rows : [element("p", { class: "hint" }, "No views are streamed.")]);
     this.show();
+    focusAgain();
   }
 
   private row({ name }: ViewInformation): HTMLElement {
     const id = identifier("view");
     const opacity = element("input", {
-      type: "range", min: 0, max: 100, step: 5, "aria-label": `${name}: opacity`, title: "opacity",
+      type: "range", min: 0, max: 100, step: 5, "data-act": "opacity", "aria-label": `${name}: opacity`, title: "opacity",
       oninput: () => this.store.dispatch({ type: "look", view: name, look: { opacity: Number(opacity.value) / 100 } }),
     });
     const visible = element("input", {
-      type: "checkbox", id, title: "shown", onchange: () => this.store.dispatch({ type: "look", view: name, look: { visible: visible.checked } }),
+      type: "checkbox", id, "data-act": "shown", title: "shown", onchange: () => this.store.dispatch({ type: "look", view: name, look: { visible: visible.checked } }),
     });
     const chosen = element("button", {
-      type: "button", class: "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
+      type: "button", class: "choose", "data-act": "choose", title: "Change how this view looks", onclick: () => this.store.dispatch({ type: "view chosen", view: name }),
     }, name, element("small", { class: "kind" }));
     visible.setAttribute("aria-label", `${name}: shown`);
     return element("div", { class: "view", "data-view": name }, element("label", { class: "shown" }, visible), chosen,

@@ -94,6 +94,23 @@ describe("notes", () => {
     expect(rows().length).toBe(2);
   });
 
+  it("keep the focus where it is, whatever is pinned and removed", () => {
+    const button = (number: number, selector: string): HTMLElement => document.querySelector<HTMLElement>(`#notes [data-note="${number}"] ${selector}`)!;
+    made.greet({ notes: [1, 2, 3].map((number) => note(number, `note ${number}`)) });
+    button(3, '[data-act="remove"]').focus();
+    made.store.dispatch({ type: "note pinned", note: note(4, "fourth") });
+    expect(document.activeElement).toBe(button(3, '[data-act="remove"]'));
+    made.store.dispatch({ type: "note removed", number: 1 });
+    expect(document.activeElement).toBe(button(3, '[data-act="remove"]'));
+    button(2, ".load").focus();
+    made.store.dispatch({ type: "note removed", number: 4 });
+    expect(document.activeElement).toBe(button(2, ".load"));
+    made.store.dispatch({ type: "note removed", number: 2 });
+    expect(document.activeElement).toBe(button(3, ".load"));
+    made.store.dispatch({ type: "note removed", number: 3 });
+    expect(document.activeElement).toBe(at("note-text"));
+  });
+
   it("lets a watcher read and fly, and write nothing", () => {
     made.greet({ role: "watcher", may_drive: false, notes: [] });
     expect(at("notes-panel").hidden).toBe(true);

@@ -111,6 +111,28 @@ describe("the pipelines of a run", () => {
     expect([at("pipeline-outcome").textContent, at("pipeline-apply").disabled, made.store.state.pipelines.open]).toEqual(["cut: applied at cycle 130.", true, keyOf("cut")]);
   });
 
+  it("keep the focus on an error while others come and go, and leave it to the text once there is none", async () => {
+    act("cut", "load").click();
+    await settle();
+    const find = async (...names: string[]): Promise<void> => {
+      const text = JSON.stringify({ name: "cut", ...Object.fromEntries(names.map((name) => [name, 1])) });
+      answer = { errors: names.map((name) => ({ line: 1, column: 2, path: name, message: `found the unknown key \`${name}\``, suggestion: null })), more: 0 };
+      FakeEditor.made.surroundings.written(text);
+      await settle();
+    };
+    const button = (row: number): HTMLElement => document.querySelectorAll<HTMLElement>("#pipeline-errors .load")[row]!;
+    await find("a", "b");
+    button(1).focus();
+    made.greet({ fields: [{ name: "speed", association: "vertex", components: 1 }] });
+    expect(document.activeElement).toBe(button(1));
+    known(cut);
+    expect(document.activeElement).toBe(button(1));
+    answer = { errors: [], more: 0 };
+    known(cut, health);
+    await settle();
+    expect(document.activeElement).toBe(at("pipeline-close"));
+  });
+
   it("are warned of where they name what nobody has, and can be applied all the same", async () => {
     act("health", "load").click();
     await settle();

@@ -24,6 +24,31 @@ it("says in words that a view is coarser, and nothing once it is exact again", (
   expect(notes()).toEqual([""]);
 });
 
+it("leaves a row as it is, and the focus in it, while other views come and go", () => {
+  const views = (...names: string[]) => ({ views: names.map((name) => ({ name, kind: "slice" as const })) });
+  const { store, greet } = page(views("shell", "cut", "jet"));
+  const root = document.body.appendChild(document.createElement("div"));
+  new ViewList(root, store);
+  const control = (view: string, act: string): HTMLElement => root.querySelector<HTMLElement>(`[data-view="${view}"] [data-act="${act}"]`)!;
+  const slider = control("cut", "opacity");
+  slider.focus();
+  const removed: Node[] = [];
+  const observer = new MutationObserver(() => undefined);
+  observer.observe(root, { childList: true });
+  greet(views("cut", "worst cells", "jet"));
+  for (const record of observer.takeRecords()) removed.push(...record.removedNodes);
+  observer.disconnect();
+  expect([document.activeElement, control("cut", "opacity"), removed.includes(slider.closest("[data-view]")!)]).toEqual([slider, slider, false]);
+  expect([...root.children].map((row) => (row as HTMLElement).dataset.view)).toEqual(["cut", "worst cells", "jet"]);
+  control("worst cells", "choose").focus();
+  greet(views("cut", "jet"));
+  expect(document.activeElement).toBe(control("jet", "choose"));
+  greet(views());
+  expect([document.activeElement, root.textContent]).toEqual([root, "No views are streamed."]);
+  greet(views("cut"));
+  expect(root.children).toHaveLength(1);
+});
+
 it("says of which stage a view is, not what the run calls everything that is no surface", () => {
   const views = ["shell", "cut", "jet", "worst cells", "line"].map((name) => ({ name, kind: name === "shell" ? "surface" : "slice" }));
   const { store } = page({ views });
