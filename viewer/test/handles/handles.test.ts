@@ -234,6 +234,19 @@ describe("shaping by hand", () => {
       expect(meant()).toBe(1);
     });
 
+    it("are larger where the pointer is over one that can be dragged, and pinned ones small", () => {
+      const radii = (): number[] => [...document.querySelectorAll(".nodes circle")].map((circle) => Number(circle.getAttribute("r")));
+      const free = radii();
+      expect([new Set(free), free.filter((radius) => radius === 3).length, free.length - 2]).toEqual([new Set([3, 5]), 2, nodes().length]);
+      const over = (place: Place): number[] => {
+        point("pointermove", place, { buttons: 0 });
+        return radii();
+      };
+      const [at] = free.flatMap((radius, i) => (radius === 5 ? [i] : []));
+      expect(over(nodes()[0]!)).toEqual(free.map((radius, i) => (i === at ? 8 : radius)));
+      expect(over([10, 10])).toEqual(free);
+    });
+
     it("adds nodes with shift, and lets them go with Escape", () => {
       for (const at of [1, 3]) {
         point("pointerdown", nodes()[at]!, { shiftKey: true });
