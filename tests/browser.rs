@@ -13,6 +13,9 @@ use tombolo_tests::{
     PATIENCE, Proxy, Run, Small, driving, free_ports, gallery, generated_mesh, program, project,
 };
 
+/// The least seconds of a step of a small mesh, which would take its steps faster than a browser draws.
+const PACE: &str = "0.02";
+
 /// A browser that draws without a GPU, and a run, are as much as two cores can do: one at a time.
 fn alone() -> MutexGuard<'static, ()> {
     static BROWSER: Mutex<()> = Mutex::new(());
@@ -49,7 +52,7 @@ fn drive_at(script: &str, url: &str, run: &Run, variables: &[(&str, String)]) {
 fn running(case: &str, mesh: &str) -> Run {
     let _ = generated_mesh(mesh);
     let case = format!("examples/flow/cases/{case}.json");
-    Run::flow(&["--case", &case, "--listen", "127.0.0.1:0"])
+    Run::flow(&["--case", &case, "--listen", "127.0.0.1:0", "--pace", "0.1"])
 }
 
 /// Runs a script on a case of the demos, which goes on behind it.
@@ -114,13 +117,7 @@ fn demonstrate(name: &str, mesh: &str) {
     let example = |kind: &str| read(&project().join(format!("examples/flow/{kind}/{name}.json")));
     let mut case = example("cases");
     case["mesh"] = generated_mesh(mesh).to_str().expect("text").into();
-    let mut pipelines = example("pipelines");
-    for pipeline in pipelines["pipelines"].as_array_mut().expect("pipelines") {
-        // A small mesh takes its steps faster than a browser draws.
-        if let Some(steps) = pipeline.pointer_mut("/every/steps") {
-            *steps = 100.into();
-        }
-    }
+    let pipelines = example("pipelines");
     for (file, content) in [("case.json", case), ("pipelines.json", pipelines)] {
         std::fs::write(path(file), content.to_string()).expect("written");
     }
@@ -133,7 +130,8 @@ fn demonstrate(name: &str, mesh: &str) {
     let mut arguments: Vec<String> =
         files.into_iter().flat_map(|(option, file)| [option.to_owned(), path(file)]).collect();
     // A core is left to the browser.
-    arguments.extend(["--listen", "127.0.0.1:0", "--threads", "1"].map(str::to_owned));
+    arguments
+        .extend(["--listen", "127.0.0.1:0", "--threads", "1", "--pace", PACE].map(str::to_owned));
     let mut run = Run::flow(&arguments);
     let url = run.link().url();
     let variables =
@@ -253,7 +251,7 @@ fn small(stream: &Value, options: &[&str]) -> (Small, Run) {
     );
     let mut arguments = vec!["--pipelines", "@pipelines.json", "--listen", "127.0.0.1:0"];
     // A core is left to the browser.
-    arguments.extend(["--threads", "1"]);
+    arguments.extend(["--threads", "1", "--pace", PACE]);
     arguments.extend(options);
     let run = Run::flow(&small.arguments(&arguments));
     (small, run)
@@ -351,7 +349,8 @@ fn runs_behind_a_relay_and_a_proxy_in_a_browser() {
                 {"name": "shape", "on": "order", "stages": [{"deform": {}}, {"schedule": {"steps": 2}}]}
             ]}),
         );
-        let arguments = ["--pipelines", "@pipelines.json", "--steps", "1000000"];
+        let arguments =
+            ["--pipelines", "@pipelines.json", "--steps", "1000000", "--pace", PACE];
         let run = Run::flow(&small.arguments(&arguments));
         (small, run)
     });

@@ -342,7 +342,7 @@ fn statistics_over_time_are_exact_for_what_changes_evenly() {
             {"slice": {"origin": [0.5, 0, 0], "normal": [1, 0, 0]}}, {"write": {"file": "a.vtu"}}]},
         {"name": "cells", "stages": [{"time_statistics": {"name": "load", "field": "load"}},
             {"threshold": {"field": "load_max", "min": 5}}, {"select": {"fields": ["load_rms"]}},
-            {"integrate": {"name": "cells", "field": "load_mean"}}, {"write": {"file": "a.vtu"}}]},
+            {"integrate": {"name": "cells", "field": "load_mean"}}, {"write": {"file": "b.vtu"}}]},
         {"name": "numbers", "stages": [{"statistics": {"field": "p"}},
             {"time_statistics": {"name": "over", "monitor": "p.max", "unit": "m"}},
             {"time_statistics": {"name": "last", "monitor": "p.max", "window": 0.5, "measures": ["mean", "min"]}}]}"#;

@@ -323,6 +323,10 @@ fn what_means_nothing_is_refused_with_its_place() {
             "pipelines[1]: two `render` write the database `a.cdb`",
         ),
         (
+            r#"{"name": "a", "stages": [{"render": {"file": "a-{cycle}.cdb"}}]}"#.into(),
+            "render.file: found `a-{cycle}.cdb`, expected a name without `{`",
+        ),
+        (
             r#"{"name": "a", "stages": [{"csv": {"file": "a.txt"}}]}"#.into(),
             "csv.file: found the file `a.txt`, expected one that ends in `.csv`",
         ),

@@ -5,6 +5,7 @@ use std::num::NonZeroU64;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 use clap::Parser;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -71,6 +72,10 @@ struct Arguments {
     /// How many threads each rank uses; without it the cores that it may run on are shared out evenly
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
+    /// Take no less than so many seconds for a step, at most 1: what a small case does in milliseconds can
+    /// be followed by eye, and leaves the cores to others meanwhile
+    #[arg(long, value_name = "SECONDS", value_parser = pace)]
+    pace: Option<Duration>,
     /// Leave this rank without any of the mesh (to test what must work on any partition)
     #[arg(long, value_name = "RANK", hide_short_help = true)]
     empty_rank: Option<usize>,
@@ -83,6 +88,16 @@ struct Arguments {
     /// How well the projections of an impulse are solved (to test that ranks solve the same)
     #[arg(long, value_name = "RELATIVE", hide_short_help = true)]
     impulse_tolerance: Option<f64>,
+}
+
+/// The least time of a step, from its text.
+fn pace(text: &str) -> Result<Duration, String> {
+    let seconds: Option<f64> = text.parse().ok();
+    // The end of a run waits for the step that is under way.
+    match seconds.filter(|seconds| (0.0..=1.0).contains(seconds)) {
+        Some(seconds) => Ok(Duration::from_secs_f64(seconds)),
+        None => Err("expected a number of seconds from 0 to 1".into()),
+    }
 }
 
 fn main() -> ExitCode {
@@ -221,6 +236,7 @@ fn run(
         orders: arguments.orders,
         replay: arguments.replay,
         steps: arguments.steps,
+        pace: arguments.pace.unwrap_or_default(),
         headless: arguments.headless,
         listen: arguments.listen,
         out: arguments.out,

@@ -5,7 +5,7 @@ use std::mem::replace;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tombolo::communicator::{Communicator, Solo};
 use tombolo::{Adaptor, FinalizeError, Restart, Settings, Step, Stopper};
@@ -49,6 +49,8 @@ pub struct Options {
     pub replay: Option<PathBuf>,
     /// How many steps to take.
     pub steps: Option<u64>,
+    /// The least time that a step takes on the clock.
+    pub pace: Duration,
     /// Whether to run without a server for viewers.
     pub headless: bool,
     /// Where the server listens, in place of what the pipelines say.
@@ -73,6 +75,7 @@ pub struct Run {
     communicator: Arc<dyn Communicator>,
     out: Option<PathBuf>,
     steps: Option<u64>,
+    pace: Duration,
     checkpoint: Option<(PathBuf, NonZeroU64)>,
     adaptor: Adaptor,
     solver: Solver,
@@ -203,6 +206,7 @@ impl Run {
             unwritten: Unwritten::default(),
             out: options.out.clone(),
             steps,
+            pace: options.pace,
             checkpoint: options.checkpoint.clone(),
             case,
             communicator,
@@ -292,6 +296,7 @@ impl Run {
         let time_step = self.case.time_step;
         let (mut velocity, mut pressure) = (self.solver.velocity(), self.solver.pressure());
         while self.steps.is_none_or(|steps| self.solver.cycle() < steps) {
+            let step_begun = Instant::now();
             let step = Step { cycle: self.solver.cycle(), time: self.solver.time(), time_step };
             let fields = [
                 FieldView::vertex("velocity", &velocity),
@@ -371,6 +376,7 @@ impl Run {
             if steering.stop {
                 break;
             }
+            std::thread::sleep(self.pace.saturating_sub(step_begun.elapsed()));
         }
         Ok(())
     }

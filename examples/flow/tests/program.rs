@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use tombolo_deform::communicator::threads;
 use tombolo_deform::mesh::FeatureSource;
@@ -120,6 +121,15 @@ fn runs_a_case_with_orders_and_undoes_them_bit_for_bit() {
     assert!(restored.mesh.points() == reference.mesh.points(), "undo did not restore every bit");
     let names: Vec<&str> = restored.fields.iter().map(|field| field.name.as_str()).collect();
     assert!(names.contains(&"velocity") && names.contains(&"pressure"), "{names:?}");
+}
+
+#[test]
+fn a_step_takes_no_less_than_its_pace() {
+    let (_folder, case) = folder(CASE);
+    let pace = Duration::from_millis(50);
+    let report = run(&Options { pace, steps: Some(4), ..headless(&case) });
+    assert_eq!((report.error, report.cycles), (None, 4));
+    assert!(report.flow.seconds >= 0.2, "{} s", report.flow.seconds);
 }
 
 #[test]

@@ -330,6 +330,8 @@ struct Fields {
     fields: Vec<(Field, usize)>,
     points: usize,
     cells: usize,
+    /// The fields of a rank that has no point or no cell of the extract.
+    without_values: Vec<Field>,
     /// Fields of the mesh as a whole, from the lowest rank that brings it.
     of_mesh: Vec<Field>,
 }
@@ -338,6 +340,7 @@ impl Fields {
     /// Takes in what one rank brings for these points and cells of the whole. What a lower rank
     /// brought for a point stays.
     fn add(&mut self, fields: Vec<Field>, points: &[u32], cells: &[u32]) {
+        let mut without_values = Vec::new();
         for field in fields {
             let (indices, before) = match field.association {
                 Association::Mesh => {
@@ -349,6 +352,10 @@ impl Fields {
                 Association::Vertex => (points, self.points),
                 Association::Element => (cells, self.cells),
             };
+            if indices.is_empty() {
+                without_values.push(field);
+                continue;
+            }
             let same = |(known, _): &(Field, usize)| {
                 (&known.name, known.association, known.components)
                     == (&field.name, field.association, field.components)
@@ -368,10 +375,6 @@ impl Fields {
                     self.fields.len() - 1
                 }
             };
-            // A rank that has nothing of the extract says which fields there are, also where nobody has.
-            if indices.is_empty() {
-                continue;
-            }
             let (known, set) = &mut self.fields[known];
             // Only a field that every rank before this one has brought can be whole.
             if *set < before {
@@ -392,6 +395,10 @@ impl Fields {
             }
             *set = before + indices.len();
         }
+        // A rank without any of the mesh knows fewer than one that has nothing of the extract.
+        if without_values.len() > self.without_values.len() {
+            self.without_values = without_values;
+        }
         self.points += points.len();
         self.cells += cells.len();
     }
@@ -399,6 +406,13 @@ impl Fields {
     /// The fields that all ranks have brought.
     fn finish(self, points: usize, cells: usize) -> Vec<Field> {
         let (all_points, all_cells) = (self.points, self.cells);
+        // Where all of the extract is empty, its fields are too.
+        let is_empty = |field: &Field| match field.association {
+            Association::Vertex => points == 0,
+            Association::Element => cells == 0,
+            Association::Mesh => false,
+        };
+        let without_values = self.without_values.into_iter().filter(is_empty);
         let whole = |(mut field, set): (Field, usize)| {
             let (brought, count) = match field.association {
                 Association::Vertex => (all_points, points),
@@ -408,6 +422,11 @@ impl Fields {
             field.settle();
             (set == brought && field.values.len() == count * field.components).then_some(field)
         };
-        self.fields.into_iter().filter_map(whole).chain(self.of_mesh).collect()
+        self.fields
+            .into_iter()
+            .filter_map(whole)
+            .chain(without_values)
+            .chain(self.of_mesh)
+            .collect()
     }
 }

@@ -19,9 +19,9 @@ use crate::limits::{CAMERAS, PICTURE, PIXELS};
 #[serde(deny_unknown_fields)]
 pub struct Render {
     /// The file: a picture that ends in `.png`, or a Cinema database (specification D) that ends in
-    /// `.cdb`, a folder to which each step adds its pictures. `{cycle}` and `{time}` stand for
-    /// those of the step as in `write`, `{camera}` for the camera's name: of several cameras, each
-    /// picture needs it. A relative file lies in the run's output directory.
+    /// `.cdb`, a folder to which each step adds its pictures. In the name of a picture `{cycle}` and
+    /// `{time}` stand for those of the step as in `write`, `{camera}` for the camera's name: of
+    /// several cameras, each picture needs it. A relative file lies in the run's output directory.
     pub file: String,
     /// The picture's width in pixels.
     #[serde(default = "width")]
@@ -330,6 +330,13 @@ impl Render {
         }
         if has_cameras && !self.is_database() && !self.file.contains("{camera}") {
             let message = "there are several cameras, expected `{camera}` in the file's name";
+            return Err(Problem::new(message));
+        }
+        if self.is_database() && self.file.contains('{') {
+            let message = format!(
+                "found `{}`, expected a name without `{{`: one database holds the pictures of all steps and cameras",
+                self.file
+            );
             return Err(Problem::new(message));
         }
         picture_pattern(&self.file, 0, 0.0, "0").map(|_| ())
