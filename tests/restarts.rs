@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use fastrand::Rng;
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Run, Small};
+use tombolo_tests::{PATIENCE, Run, Small, Viewer};
 
 fn pinch(factor: f64, steps: u32, every: u32) -> Value {
     json!({"edits": [{"scale_direction": {
@@ -104,6 +104,39 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
     let (status, text) = Run::flow(&replay.arguments(&more)).finish(PATIENCE);
     assert!(status.success(), "{text}");
     assert!(results(&replay) == results(&whole), "the replay differs");
+}
+
+/// An order that is on disk and whose shapes are being found when the run is stopped is carried out by
+/// the run that goes on.
+#[test]
+fn an_order_that_is_being_planned_at_a_signal_is_not_lost() {
+    let small = Small::new();
+    small.write(
+        "pipelines.json",
+        &json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl"}),
+    );
+    let options = ["--pipelines", "@pipelines.json", "--checkpoint-every", "100000"];
+    let mut run = Run::flow(&small.arguments(&options));
+    let mut viewer = Viewer::connect(&run.link()).expect("the run lets in");
+    viewer.wait_for("hello", |hello| hello["role"] == "driver");
+    // So many edits and shapes take longer than it takes to send the signal.
+    let edit = json!({"translate": {
+        "features": ["throat"], "fixed": ["inlet", "outlet"], "by": [0, 0, 1e-6]}});
+    let order = json!({"edits": vec![edit; 2000], "schedule": {"steps": 10_000}});
+    viewer.send(&json!({"id": "long", "order": order}));
+    viewer.wait_for("order", |order| order["id"] == "long" && order["status"] == "computing");
+    run.signal("TERM");
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
+    let journal = String::from_utf8(small.bytes("out/journal.jsonl")).expect("UTF-8");
+    assert!(!journal.contains("rejected"), "{journal:.2000}");
+    let state = small.path("out/flow.state").display().to_string();
+    let mut run = Run::flow(&small.arguments(&[&options[..], &["--restart", &state]].concat()));
+    let mut viewer = Viewer::connect(&run.link()).expect("the run lets in");
+    viewer.wait_for("order", |order| order["id"] == "long" && order["status"] == "applying");
+    run.signal("TERM");
+    let (status, text) = run.finish(PATIENCE);
+    assert!(status.success(), "{text}");
 }
 
 #[test]

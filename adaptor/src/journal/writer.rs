@@ -13,7 +13,7 @@ use std::{
 
 use tombolo_pipelines::{
     language::{CheckpointNote, JournalEntry, JournalNote, LostLines, OrderStatus, RunHeader},
-    limits::{WAITING, WAITING_BYTES},
+    limits::{DOCUMENT, WAITING, WAITING_BYTES},
 };
 
 use super::{
@@ -207,6 +207,10 @@ impl Journal {
             ..entry.clone()
         };
         let (text, taken_back) = (line(entry), line(&taken_back));
+        // Numbers may take more letters than they came in.
+        if let Err(exceeded) = DOCUMENT.check(text.len()) {
+            return settle(Err(format!("{exceeded}, in its line of the journal")));
+        }
         let mut state = lock(&shared.state);
         let room = WAITING
             .check(state.asked + 1)

@@ -95,6 +95,8 @@ struct WaitingJobs {
     at_forecast: Option<ForecastUnderWay>,
     prepare: Option<Deformation>,
     ahead: Option<PlanRequest>,
+    /// Whether another thread makes a plan, or waits to: no forecast is begun before it.
+    is_planned_elsewhere: bool,
     /// Whatever is asked for is given up.
     gives_up: bool,
     closed: bool,
@@ -134,7 +136,10 @@ impl Jobs {
                 self.cancellation.renew();
             }
             let job = (state.plans.pop_front().map(|(number, asked)| Job::Plan(number, asked)))
-                .or_else(|| state.forecasts.pop_front().map(Job::Forecast))
+                .or_else(|| {
+                    let is_free = !state.is_planned_elsewhere;
+                    is_free.then(|| state.forecasts.pop_front().map(Job::Forecast)).flatten()
+                })
                 .or_else(|| state.prepare.take().map(Job::Prepare))
                 .or_else(|| state.ahead.take().map(Job::Ahead));
             if let Some(job) = job {
@@ -237,6 +242,20 @@ impl Jobs {
             }
         };
         (question.answer)(told);
+    }
+
+    /// Makes way for a plan that another thread is about to make, as for one of the worker's own.
+    fn begin_elsewhere(&self, asked: &PlanRequest) {
+        self.change(|state| {
+            state.is_planned_elsewhere = true;
+            self.give_forecast_up(state, GivenUp::Delayed, |underway| {
+                underway.given_up.is_none() && !underway.asked.is(asked)
+            });
+        });
+    }
+
+    fn end_elsewhere(&self) {
+        self.change(|state| state.is_planned_elsewhere = false);
     }
 
     /// Lets a plan go on that another thread makes while this one has no plan under way: what was
@@ -377,9 +396,14 @@ impl Worker {
         planner: &Mutex<Planner>,
         asked: &PlanRequest,
     ) -> Result<Plan, Rejection> {
-        let mut planner = lock(planner);
-        self.jobs.renew();
-        planner.plan(asked)
+        self.jobs.begin_elsewhere(asked);
+        let plan = {
+            let mut planner = lock(planner);
+            self.jobs.renew();
+            planner.plan(asked)
+        };
+        self.jobs.end_elsewhere();
+        plan
     }
 
     /// The next finished job, if there is one.

@@ -35,23 +35,28 @@ impl Hub {
     /// Gives a viewer a name; an empty one takes it away.
     pub(super) fn call(&self, client: u64, called: &str) {
         let together = &mut lock(&self.state).together;
-        if called.is_empty() {
-            together.names.remove(&client);
+        let before = if called.is_empty() {
+            together.names.remove(&client)
         } else {
-            together.names.insert(client, called.to_owned());
+            together.names.insert(client, called.to_owned())
+        };
+        // Who says again what is known has nobody told.
+        if before.as_deref().unwrap_or_default() != called {
+            together.changed();
         }
-        together.changed();
     }
 
     /// Has a viewer sent the camera of the one that drives, or not any more.
     pub(super) fn follow(&self, client: u64, follows: bool) {
         let together = &mut lock(&self.state).together;
-        if follows {
-            together.followers.insert(client);
+        let is_new = if follows {
+            together.followers.insert(client)
         } else {
-            together.followers.remove(&client);
+            together.followers.remove(&client)
+        };
+        if is_new {
+            together.changed();
         }
-        together.changed();
     }
 
     /// Shows the camera of the one that drives to those who follow it; the error says why not.

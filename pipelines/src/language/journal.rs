@@ -387,6 +387,14 @@ impl RunLines<'_> {
                     is_entry: true,
                 });
             }
+            // Given again, perhaps with another text, after it was taken back.
+            (OrderStatus::Accepted, Some(command), Some(index))
+                if !known.commands[index].is_carried_out =>
+            {
+                let again = &mut known.commands[index];
+                again.timed.command = command;
+                (again.timed.at, again.by, again.took_effect) = (at, entry.by, number);
+            }
             (OrderStatus::Applied, _, Some(index)) => {
                 let command = &mut known.commands[index];
                 command.timed.at = at;

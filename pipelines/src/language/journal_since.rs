@@ -260,8 +260,15 @@ impl Reader {
                 self.given_again.insert(id);
                 return Ok(());
             }
+            let taken = self.taken(id.clone())?;
+            // One that was taken back, as from a disk that did not answer, may have been given again.
+            let is_anew = matches!(taken.outcome, Outcome::Rejected { .. });
+            if is_anew {
+                taken.outcome = Outcome::Open {};
+                self.history.settled.retain(|(known, _)| *known != id);
+            }
             let taken = self.taken(id)?;
-            if taken.command.is_none() {
+            if taken.command.is_none() || is_anew {
                 taken.by = by.unwrap_or(CommandAuthor::Program);
                 taken.command = Some(command);
             }
@@ -355,6 +362,26 @@ mod tests {
         );
         assert_eq!((since.shapes.len(), since.until, since.has_checkpoint), (1, Some(5), true));
         assert_eq!(read(JOURNAL, "r2").unwrap(), Since::default());
+    }
+
+    /// A disk that did not answer had the order refused, and wrote its lines after all; its client gave it
+    /// again.
+    #[test]
+    fn an_order_that_is_given_again_after_it_was_refused_is_open() {
+        let again = r#"{"id":"open","status":"accepted","cycle":6,"time":0,"order":{"undo":3},"by":{"viewer":"c2"}}
+"#;
+        let end = JOURNAL.find("{\"id\":\"torn\"").unwrap();
+        let text = format!("{}{again}", &JOURNAL[..end]);
+        let since = read(&text, "r1").unwrap();
+        assert_eq!(settled(&since), [("b", 4), ("open", 0), ("p", 0)]);
+        let open = &since.commands[1];
+        assert_eq!(open.by, CommandAuthor::Viewer("c2".into()));
+        let Some(Command::Order(order)) = &open.command else { panic!("{open:?}") };
+        assert_eq!(serde_json::to_value(order).unwrap()["undo"], 3);
+        let done = r#"{"id":"open","status":"applied","cycle":7,"time":0}
+"#;
+        let since = read(&format!("{text}{done}"), "r1").unwrap();
+        assert_eq!(settled(&since), [("b", 4), ("open", 7), ("p", 0)]);
     }
 
     #[test]

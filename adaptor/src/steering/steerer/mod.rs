@@ -97,6 +97,9 @@ pub(crate) struct Steerer {
     deadline: Duration,
     /// Whether the run is paused: then plans are made, and no order begins to move the mesh.
     paused: bool,
+    /// Whether the kernel was given up because the run ends: the order whose shapes were being found
+    /// is left as it is, for a checkpoint to hold it.
+    ends: bool,
     computing: Option<Computing>,
     motion: Option<Motion>,
     /// The motion that was handed out last.
@@ -210,6 +213,7 @@ impl Steerer {
             skeleton: None,
             present,
             looked_ahead: false,
+            ends: false,
             stack,
             here,
             waiting: VecDeque::new(),

@@ -16,6 +16,10 @@ use crate::{
     step::Moment,
 };
 
+fn is_given_up(plan: &Result<Plan, Rejection>) -> bool {
+    plan.as_ref().is_err_and(|rejection| rejection.is_cancelled)
+}
+
 impl Steerer {
     /// Brings orders as far as they can come now; says whether anything changed. Called at safe
     /// points only. On several ranks an order whose plan is given up waits again, in its place, and
@@ -24,6 +28,9 @@ impl Steerer {
         let mut changed = false;
         loop {
             changed |= self.collect(moment, step_seconds);
+            if self.ends {
+                return changed;
+            }
             if let Some(computing) = &self.computing {
                 if self.paused {
                     return changed;
@@ -107,16 +114,27 @@ impl Steerer {
                         let order = (!is_repeated).then(|| UnderWay::Order(computing.id.clone()));
                         let plan = || lock(&self.planner).plan(&computing.asked);
                         let plan = together.run(order, plan);
-                        if plan.as_ref().is_err_and(|rejection| rejection.is_cancelled) {
+                        if is_given_up(&plan) {
                             return Some(computing.into_task());
                         }
                         plan
                     }
                 };
-                self.take_plan(computing, plan, moment, begun, step_seconds);
+                if is_given_up(&plan) {
+                    self.leave(computing);
+                } else {
+                    self.take_plan(computing, plan, moment, begun, step_seconds);
+                }
             }
         }
         None
+    }
+
+    /// Leaves an order whose plan was given up because the run ends. Whoever cancels an order takes it away
+    /// before.
+    fn leave(&mut self, computing: Computing) {
+        self.ends = true;
+        self.computing = Some(computing);
     }
 
     fn finish(&mut self, done: Done, moment: Moment, step_seconds: Option<f64>) {
@@ -137,6 +155,9 @@ impl Steerer {
                 let Some(computing) = self.computing.take_if(|asked| asked.number == number) else {
                     return;
                 };
+                if is_given_up(&plan) {
+                    return self.leave(computing);
+                }
                 let is_stale = (*plan).as_ref().is_ok_and(|plan| !self.is_of_now(plan))
                     || computing.defaults != self.defaults;
                 if is_stale && self.worker.is_some() {

@@ -56,6 +56,56 @@ fn an_order_is_planned_in_the_moment_in_which_another_is_cancelled() {
     assert_eq!(log.reports().into_iter().find(refused), None);
 }
 
+/// A run that is stopped gives up the shapes that are being found. The order stays as it is, for the
+/// checkpoint that may follow.
+#[test]
+fn an_order_whose_shapes_are_given_up_by_the_end_is_not_refused() {
+    let mesh = box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
+    let surface = Arc::new(Surface::extract(&mesh, &FeatureSettings::default()).unwrap());
+    for background in [true, false] {
+        let shaper = Shaper::new(&mesh, Arc::clone(&surface)).unwrap();
+        let log = Arc::new(Log::new(Journal::none(), None, Events::default()));
+        let mut steerer =
+            Steerer::new(shaper, Defaults::default(), Arc::clone(&log), Arc::default(), false)
+                .unwrap();
+        let moment = Moment::default();
+        let jobs = Arc::clone(steerer.worker.as_ref().unwrap().jobs());
+        let stops = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(200));
+            jobs.give_up();
+        });
+        for id in ["long", "behind"] {
+            let order: Order = serde_json::from_value(serde_json::json!({
+                "edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -0.2]}}],
+                "schedule": {"steps": 10_000}
+            }))
+            .unwrap();
+            log.accept(Some(id.into()), &Source::Program, &Command::Order(order.clone()), moment)
+                .unwrap();
+            steerer.take(id.into(), order, background, None, None);
+            steerer.advance(moment, None);
+        }
+        stops.join().unwrap();
+        let until = std::time::Instant::now() + Duration::from_secs(60);
+        while !steerer.ends && std::time::Instant::now() < until {
+            steerer.advance(moment, None);
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // Neither waits for what does not come.
+        steerer.advance(moment, None);
+        let reports = log.reports();
+        let statuses: Vec<_> = reports.iter().map(|report| (&*report.id, report.status)).collect();
+        assert_eq!(
+            statuses,
+            [("long", OrderStatus::Computing), ("behind", OrderStatus::Accepted)],
+            "background: {background}"
+        );
+        steerer.end(moment, false);
+        let refused = log.reports().into_iter().map(|report| report.status);
+        assert_eq!(refused.collect::<Vec<_>>(), [OrderStatus::Rejected; 2]);
+    }
+}
+
 /// The operator of a large mesh takes seconds to set up, and the first step asks for these.
 #[test]
 fn what_stays_the_same_is_told_while_the_planner_is_at_work() {

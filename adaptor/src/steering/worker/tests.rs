@@ -87,6 +87,25 @@ fn a_forecast_makes_way_for_an_order_and_is_found_after_it() {
     assert_eq!(told.try_iter().collect::<Vec<_>>(), [("forecast", None)]);
 }
 
+/// The solver's thread does not wait for a forecast either, and none takes the kernel before it.
+#[test]
+fn a_forecast_makes_way_for_a_plan_of_another_thread() {
+    let (jobs, tell, told) = jobs();
+    ask(&jobs, &tell, 1, "under way");
+    let question = begin(&jobs);
+    jobs.begin_elsewhere(&other());
+    assert!(jobs.cancellation.is_cancelled());
+    end(&jobs, question);
+    // It waits again; what is next meanwhile is something else.
+    jobs.change(|state| state.ahead = Some(request()));
+    assert!(matches!(jobs.next(), Some(Job::Ahead(_))));
+    jobs.renew();
+    assert!(!jobs.cancellation.is_cancelled());
+    jobs.end_elsewhere();
+    end(&jobs, begin(&jobs));
+    assert_eq!(told.try_iter().collect::<Vec<_>>(), [("under way", None)]);
+}
+
 #[test]
 fn a_forecast_is_given_up_once_nobody_waits_for_it() {
     let (jobs, tell, told) = jobs();

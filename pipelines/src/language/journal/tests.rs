@@ -34,6 +34,24 @@ fn only_what_took_effect_in_the_newest_run_is_carried_out_again() {
     assert!(!is_journal("{\"version\": 1}\n") && !is_journal("cycle,time\n"));
 }
 
+/// What counts is what was given again after it was taken back, with its own text.
+#[test]
+fn an_order_that_is_given_again_is_carried_out_as_it_is_then() {
+    let text = r#"{"run":{"id":"1","version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":1}}}
+{"id":"a","status":"accepted","cycle":1,"time":0.1,"order":{"undo":1}}
+{"id":"a","status":"rejected","cycle":1,"time":0.1,"reason":"the disk has not answered for 2 seconds"}
+{"id":"a","status":"accepted","cycle":2,"time":0.2,"order":{"undo":2}}
+{"id":"a","status":"applied","cycle":3,"time":0.3}
+"#;
+    let recording = parse_journal(text, "journal.jsonl").unwrap();
+    let [again] = &recording.commands[..] else { panic!("{:?}", recording.commands) };
+    assert_eq!((again.id.as_deref(), again.at), (Some("a"), Some(At::Cycle(3))));
+    assert_eq!(
+        serde_json::to_value(&again.command).unwrap(),
+        serde_json::json!({"order": {"undo": 2}})
+    );
+}
+
 #[test]
 fn a_restarted_run_begins_with_the_lines_before_its_checkpoint() {
     let header = |id: &str, restart: &str| {
