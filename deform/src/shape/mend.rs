@@ -15,7 +15,7 @@ use super::carry::Carrier;
 use super::plan::{CurrentShape, Plan, travel};
 use super::{
     Deformation, Phase, Refused, Request, ShapeSeconds, Shaper, Target, check_stack, displaced,
-    moved,
+    moved, require_plane,
 };
 use crate::communicator::Communicator;
 
@@ -46,6 +46,8 @@ struct OnReference<'a> {
     positions: Vec<Vector>,
     stack: Vec<Edit>,
     edit: Edit,
+    /// Whether no vertex may leave the plane of its mesh.
+    in_plane: bool,
     /// Where the boundary lies before the edit and its displacement there, where that is not what
     /// the stack says.
     ground: Option<(Vec<Vector>, Vec<Vector>)>,
@@ -61,7 +63,8 @@ impl BoundaryMotion for OnReference<'_> {
             *last = self.edit.scaled(to);
         }
         let editor = self.editor.as_deref_mut();
-        let displacement = displacement(editor, &self.body, &self.stack, self.carrier.as_deref())?;
+        let carrier = self.carrier.as_deref();
+        let displacement = displacement(editor, &self.body, &self.stack, carrier, self.in_plane)?;
         Ok(match &self.ground {
             None => self
                 .positions
@@ -130,8 +133,15 @@ fn displacement(
     body: &Body,
     stack: &[Edit],
     carrier: Option<&Carrier>,
+    in_plane: bool,
 ) -> Result<Vec<Vector>, Refused> {
-    let displacement = body.scatter(displaced(editor, stack))?;
+    let displaced = displaced(editor, stack).and_then(|displacement| {
+        if let (Some(surface), true) = (body.surface(), in_plane) {
+            require_plane(surface.points(), &displacement)?;
+        }
+        Ok(displacement)
+    });
+    let displacement = body.scatter(displaced)?;
     match carrier {
         Some(carrier) => carrier.settle(displacement),
         None => Ok(displacement),
@@ -202,6 +212,12 @@ impl Shaper {
         if target.surface_only || start.surface_only {
             let ends = check_ends(self.body.domain.mesh(), &start.points, &target.points);
             self.body.agree(ends.map_err(Refused::from))?;
+            if !target.surface_only {
+                // The solver moves its volume on the way; where that ends, it is the target's.
+                let end = self.body.judge(&target.points, &target.points, &[1.0], guard);
+                let end = self.body.unless_given_up(end.map_err(Refused::from));
+                self.body.agree(end)?;
+            }
             let plan = self.along_surface(start, target, schedule, guard);
             let spent = watch.seconds();
             self.spent.guard += spent;
@@ -299,7 +315,8 @@ impl Shaper {
             };
             Arc::clone(known.get_or_init(made))
         };
-        let ground = displacement(self.editor.as_mut(), &body, below, carrier.as_deref())?;
+        let ground =
+            displacement(self.editor.as_mut(), &body, below, carrier.as_deref(), self.in_plane)?;
         let reference = body.positions(&self.reference);
         let stated = reference.iter().zip(&ground).map(|(&point, &by)| moved(point, by));
         let as_stated = body.communicator().all(stated.eq(positions.iter().copied()));
@@ -310,6 +327,7 @@ impl Shaper {
             positions: reference,
             stack: stack.to_vec(),
             edit: edit.clone(),
+            in_plane: self.in_plane,
             ground: (!as_stated).then_some((positions, ground)),
             rule: guard.surface,
         };
@@ -392,8 +410,9 @@ impl Shaper {
                 .and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard))
             {
                 Ok(plan) => Ok(Some(plan)),
-                Err(refused) if refused.is_quality() || refused.is_surface() => Ok(None),
-                Err(other) => Err(other),
+                Err(refused) if refused.is_cancelled() => Err(refused),
+                // A part may be refused for what the whole is not, such as leaving its plane on the way.
+                Err(_) => Ok(None),
             }
         };
         // The shapes of most edits lie on a straight way, on which the fraction is known.

@@ -392,7 +392,7 @@ impl Shaper {
             }
             // Where a part of the surface is let go, it is looked at where it ends.
             if let (Some(surface), false, SurfaceRule::Reject) =
-                (body.surface(), deform.lets_go(), rule)
+                (body.surface(), deform.lets_go() && !deform.surface_only, rule)
             {
                 let moved = surface
                     .points()

@@ -383,7 +383,8 @@ fn around(
         .communicator()
         .all(Arc::ptr_eq(&start.points, reference) || *start.points == **reference);
     let leaving: Vec<&Arc<[Vector]>> = if at_reference {
-        vec![reference]
+        // The start's own points, by which it is known whose plan this is.
+        vec![&start.points]
     } else {
         std::iter::once(&start.points).chain(&start.back).collect()
     };

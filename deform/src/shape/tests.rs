@@ -384,6 +384,50 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
     }
 }
 
+/// It is by the points themselves that a plan is known to begin where the mesh is.
+#[test]
+fn a_way_over_other_shapes_begins_with_the_start_that_was_asked_for() {
+    let mesh = box_of_tets([4, 4, 8], [0.0; 3], [1.0, 1.0, 2.0]);
+    let turned = stack(
+        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 130}}]),
+    );
+    let otherwise = Otherwise::Untangle;
+    let guard = Guard { min_scaled_jacobian: 0.05, otherwise, surface: SurfaceRule::Allow };
+    let mut shaper = alone(&mesh);
+    let copy: Arc<[Vector]> = shaper.reference().to_vec().into();
+    let deformation = tight(json!({}));
+    let request = Request { guard, deformation, ..Request::new(&turned[..], Arc::clone(&copy)) };
+    let plan = shaper.plan(&request).unwrap();
+    assert!(plan.way().len() > 2);
+    assert!(Arc::ptr_eq(plan.start(), &copy));
+}
+
+/// The solver moves its volume by itself on the way there; what it is to come to is Tombolo's.
+#[test]
+fn a_volume_that_follows_a_surface_alone_is_judged_where_it_ends() {
+    let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
+    let mut shaper = alone(&mesh);
+    let lower = |by: f64| {
+        stack(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, by]}}]))
+    };
+    let surface_only = Deformation { surface_only: true, ..Deformation::default() };
+    let plan = shaper.plan(&asked(&shaper, &lower(-0.1), &surface_only)).unwrap();
+    let start = plan.reached(f64::from(plan.shapes()), Arc::clone(plan.end()));
+    assert!(start.surface_only);
+    for (by, is_sound) in [(-0.3, true), (-0.999, false), (0.0, true)] {
+        let from_there =
+            Request { start: start.clone(), ..asked(&shaper, &lower(by), &Deformation::default()) };
+        match shaper.plan(&from_there) {
+            Ok(plan) => {
+                assert!(is_sound, "{by}");
+                let end = quality(mesh.cells(), plan.end());
+                assert!(end.inverted == 0 && end.min > 0.02, "{by}: {end:?}");
+            }
+            Err(refused) => assert!(!is_sound && refused.is_quality(), "{by}: {refused}"),
+        }
+    }
+}
+
 /// An error of one rank is the error of all ranks, in the same words.
 #[test]
 fn an_error_of_one_rank_is_that_of_all() {
@@ -512,4 +556,12 @@ fn a_mesh_of_two_coordinates_stays_in_its_plane() {
     let forecast = shaper.forecast(&outside);
     assert!(forecast.reason.is_some_and(|reason| reason.contains("along z, expected 0")));
     assert!(alone(&mesh).plan(&outside).is_ok());
+    // Half a turn about an axis of the plane ends in it, mirrored; on the way there it is outside.
+    let all = json!({"box": {"lower": [-1, -1, -1], "upper": [2, 2, 1]}});
+    let turned = stack(json!([{"rotate": {"region": all, "axis": [1, 0, 0], "degrees": 180}}]));
+    for otherwise in [Otherwise::Reject, Otherwise::Clamp, Otherwise::Untangle] {
+        let guard = Guard { otherwise, ..Guard::default() };
+        let outcome = shaper.plan(&Request { guard, ..asked(&shaper, &turned, &deformation) });
+        assert!(outcome.is_err(), "{otherwise:?}");
+    }
 }

@@ -59,6 +59,13 @@ pub(super) fn for_each_corner_of(mesh: &Mesh, mut visit: impl FnMut(Corner)) {
     }
 }
 
+/// Whether cells of this type have corners.
+pub(super) fn has_corners(cell_type: CellType) -> bool {
+    let mut found = false;
+    for_each_corner(cell_type, |_| found = true);
+    found
+}
+
 /// For each edge of hexahedra, and each edge between the triangles of wedges, the two tetrahedra of
 /// the edge, a neighbour of one of its ends and the other neighbour of the other end.
 ///

@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-use super::corners::{Corner, corners, edges};
+use super::colours::Held;
+use super::corners::{Corner, corners, edges, has_corners};
 use super::newton::{Energy, Newton};
 use super::{Improver, foldover};
 use crate::cancellation::Cancellation;
@@ -97,13 +98,24 @@ impl Untangler {
         let domain = domain.into();
         let mesh = domain.mesh();
         let least = quality(mesh.cells(), mesh.points()).gathered(&domain).min;
-        let (near, numbering) = Ordered::new(mesh).into_parts();
+        let ordered = Ordered::new(mesh);
+        let held = (domain.communicator().size() > 1).then(|| Held::new(&ordered, domain.halo()));
+        let (near, numbering) = ordered.into_parts();
         let corners = corners(&near);
         let mut free = vec![true; mesh.points().len()];
         boundary
             .iter()
             .filter_map(|&vertex| numbering.index(vertex))
             .for_each(|index| free[index as usize] = false);
+        // The energy knows nothing of cells without corners: what they hold stays where it is, on all ranks.
+        for (cell_type, vertices) in near.cells().iter() {
+            if cell_type.dimension() == 3 && !has_corners(cell_type) {
+                vertices.iter().for_each(|&vertex| free[vertex as usize] = false);
+            }
+        }
+        if let Some(held) = &held {
+            held.all(&mut free);
+        }
         let newton = Newton::new(&near, &corners, &free, &numbering, domain.halo());
         let curved = domain
             .communicator()
