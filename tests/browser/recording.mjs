@@ -78,7 +78,8 @@ const steps = [
     await drag(0.25, 0.8);
     await viewer.until("the moment of behind the order", async ({ stack, cycle: shown }) => stack.length === 1 && shown > last.cycle / 2 && (await cycle()) > last.cycle / 2 && (await stand()) > 0.65);
     await height(0.8);
-    check((await viewer.drawn()).pixels !== pixels, "the picture is that of before");
+    // The picture comes a moment after the numbers.
+    await viewer.until("another picture than that of before", async () => (await viewer.drawn()).pixels !== pixels);
   }],
   ["the same tools serve as in a run: pins, ruler, histogram, before and after, film, and the slider by keys", async () => {
     await page.mouse.move(...(await viewer.place("throat")));

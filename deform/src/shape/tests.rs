@@ -389,10 +389,10 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
 fn a_way_over_other_shapes_begins_with_the_start_that_was_asked_for() {
     let mesh = box_of_tets([4, 4, 8], [0.0; 3], [1.0, 1.0, 2.0]);
     let turned = stack(
-        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 130}}]),
+        json!([{"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 165}}]),
     );
     let otherwise = Otherwise::Untangle;
-    let guard = Guard { min_scaled_jacobian: 0.05, otherwise, surface: SurfaceRule::Allow };
+    let guard = Guard { min_scaled_jacobian: 0.01, otherwise, surface: SurfaceRule::Allow };
     let mut shaper = alone(&mesh);
     let copy: Arc<[Vector]> = shaper.reference().to_vec().into();
     let deformation = tight(json!({}));
@@ -408,7 +408,9 @@ fn a_volume_that_follows_a_surface_alone_is_judged_where_it_ends() {
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
     let mut shaper = alone(&mesh);
     let lower = |by: f64| {
-        stack(json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, by]}}]))
+        stack(
+            json!([{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0, 0, by], "harmonic_order": 1}}]),
+        )
     };
     let surface_only = Deformation { surface_only: true, ..Deformation::default() };
     let plan = shaper.plan(&asked(&shaper, &lower(-0.1), &surface_only)).unwrap();
