@@ -63,7 +63,7 @@ fn tables_and_files_are_written_and_told_in_the_report() {
     assert_eq!(series.matches("<DataSet ").count(), 2, "{series}");
 
     let [speed, close, states, end] = &report.pipelines[..] else { panic!("{report:?}") };
-    assert_eq!([speed.runs, close.runs, states.runs, end.runs], [4, 7, 7, 0]);
+    assert_eq!([speed.runs, close.runs, states.runs, end.runs], [4, 7, 7, 1]);
     assert!(states.bytes > 7 * 1000 && states.seconds > 0.0 && speed.bytes == 0);
     let max = speed.monitors.iter().find(|monitor| monitor.name == "speed.max").unwrap();
     assert_eq!((max.unit.as_deref(), max.last), (Some("m/s"), Some(2.06)));

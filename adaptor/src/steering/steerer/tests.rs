@@ -71,7 +71,7 @@ fn an_order_whose_shapes_are_given_up_by_the_end_is_not_refused() {
         let moment = Moment::default();
         let jobs = Arc::clone(steerer.worker.as_ref().unwrap().jobs());
         let stops = std::thread::spawn(move || {
-            std::thread::sleep(Duration::from_millis(200));
+            std::thread::sleep(Duration::from_millis(20));
             jobs.give_up();
         });
         for id in ["long", "behind"] {
