@@ -30,41 +30,41 @@ enum Compared {
 }
 
 const SLICES: &str = r#"
-    {"name": "plane", "stages": [{"slice": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}}, {"write": {"file": "a.vtu"}}]},
+    {"name": "plane", "stages": [{"slice": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}}, {"write": {"file": "plane.vtu"}}]},
     {"name": "planes", "stages": [{"slice": {"planes": [
-        {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}, {"origin": [0.3, 0.2, 0.55], "normal": [0.1, 0.3, 2]}]}}, {"write": {"file": "a.vtu"}}]}"#;
+        {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}, {"origin": [0.3, 0.2, 0.55], "normal": [0.1, 0.3, 2]}]}}, {"write": {"file": "planes.vtu"}}]}"#;
 const ROUND: &str = r#"
-    {"name": "cylinder", "stages": [{"slice": {"cylinder": {"origin": [1, 0.5, 0], "axis": [0.3, 0.1, 1], "radius": 0.37}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "sphere", "stages": [{"slice": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "contour", "stages": [{"contour": {"field": "p", "values": [0.11, 0.42]}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "contour of a magnitude", "stages": [{"magnitude": {"field": "u", "name": "speed"}}, {"contour": {"field": "speed", "values": [0.9]}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "cylinder", "stages": [{"slice": {"cylinder": {"origin": [1, 0.5, 0], "axis": [0.3, 0.1, 1], "radius": 0.37}}}, {"write": {"file": "cylinder.vtu"}}]},
+    {"name": "sphere", "stages": [{"slice": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}}}, {"write": {"file": "sphere.vtu"}}]},
+    {"name": "contour", "stages": [{"contour": {"field": "p", "values": [0.11, 0.42]}}, {"write": {"file": "contour.vtu"}}]},
+    {"name": "contour of a magnitude", "stages": [{"magnitude": {"field": "u", "name": "speed"}}, {"contour": {"field": "speed", "values": [0.9]}}, {"write": {"file": "contour-of-a-magnitude.vtu"}}]}"#;
 const THRESHOLDS: &str = r#"
-    {"name": "by elements", "stages": [{"threshold": {"field": "load", "min": 3, "max": 11}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "all vertices", "stages": [{"threshold": {"field": "p", "min": 0.2}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "any vertex", "stages": [{"threshold": {"field": "p", "max": 0.1, "vertices": "any"}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "by elements", "stages": [{"threshold": {"field": "load", "min": 3, "max": 11}}, {"write": {"file": "by-elements.vtu"}}]},
+    {"name": "all vertices", "stages": [{"threshold": {"field": "p", "min": 0.2}}, {"write": {"file": "all-vertices.vtu"}}]},
+    {"name": "any vertex", "stages": [{"threshold": {"field": "p", "max": 0.1, "vertices": "any"}}, {"write": {"file": "any-vertex.vtu"}}]}"#;
 const CLIPS: &str = r#"
-    {"name": "clip", "stages": [{"clip": {"plane": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "other side", "stages": [{"clip": {"plane": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}, "invert": true}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "clip by a sphere", "stages": [{"clip": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "outside of a sphere", "stages": [{"clip": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}, "invert": true}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "clip by a field", "stages": [{"clip": {"field": {"name": "p", "value": 0.2}}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "clip", "stages": [{"clip": {"plane": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}}}, {"write": {"file": "clip.vtu"}}]},
+    {"name": "other side", "stages": [{"clip": {"plane": {"origin": [0.9, 0.4, 0.5], "normal": [1, 0.3, -0.2]}, "invert": true}}, {"write": {"file": "other-side.vtu"}}]},
+    {"name": "clip by a sphere", "stages": [{"clip": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}}}, {"write": {"file": "clip-by-a-sphere.vtu"}}]},
+    {"name": "outside of a sphere", "stages": [{"clip": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.43}, "invert": true}}, {"write": {"file": "outside-of-a-sphere.vtu"}}]},
+    {"name": "clip by a field", "stages": [{"clip": {"field": {"name": "p", "value": 0.2}}}, {"write": {"file": "clip-by-a-field.vtu"}}]}"#;
 const BOXES: &str = r#"
-    {"name": "clip by a box", "stages": [{"clip": {"box": {"lower": [0.33, 0.21, -1], "upper": [1.4, 0.7, 0.62]}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "around a box", "stages": [{"clip": {"box": {"lower": [0.33, 0.21, 0.2], "upper": [1.4, 0.7, 0.62]}, "invert": true}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "clip by a box", "stages": [{"clip": {"box": {"lower": [0.33, 0.21, -1], "upper": [1.4, 0.7, 0.62]}}}, {"write": {"file": "clip-by-a-box.vtu"}}]},
+    {"name": "around a box", "stages": [{"clip": {"box": {"lower": [0.33, 0.21, 0.2], "upper": [1.4, 0.7, 0.62]}, "invert": true}}, {"write": {"file": "around-a-box.vtu"}}]}"#;
 const PROBES: &str = r#"
-    {"name": "probe", "stages": [{"probe": {"points": [[0.31, 0.22, 0.13], [1.07, 0.55, 0.61], [1.93, 0.91, 0.87]]}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "line", "stages": [{"probe": {"line": {"from": [0.013, 0.047, 0.171], "to": [1.931, 0.89, 0.773], "count": 57}}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "grid", "stages": [{"probe": {"grid": {"lower": [0.03, 0.04, 0.05], "upper": [1.94, 0.93, 0.89], "counts": [9, 7, 5]}}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "probe", "stages": [{"probe": {"points": [[0.31, 0.22, 0.13], [1.07, 0.55, 0.61], [1.93, 0.91, 0.87]]}}, {"write": {"file": "probe.vtu"}}]},
+    {"name": "line", "stages": [{"probe": {"line": {"from": [0.013, 0.047, 0.171], "to": [1.931, 0.89, 0.773], "count": 57}}}, {"write": {"file": "line.vtu"}}]},
+    {"name": "grid", "stages": [{"probe": {"grid": {"lower": [0.03, 0.04, 0.05], "upper": [1.94, 0.93, 0.89], "counts": [9, 7, 5]}}}, {"write": {"file": "grid.vtu"}}]}"#;
 const DERIVED: &str = r#"
-    {"name": "gradient", "stages": [{"gradient": {"field": "p"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "gradient of a vector", "stages": [{"gradient": {"field": "u", "name": "du"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "gradient in cells", "stages": [{"gradient": {"field": "load"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "vorticity", "stages": [{"vorticity": {"field": "u"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "vorticity in cells", "stages": [{"vorticity": {"field": "flux", "name": "turning"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "divergence", "stages": [{"divergence": {"field": "u"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "q", "stages": [{"q_criterion": {"field": "u"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "magnitude", "stages": [{"magnitude": {"field": "flux"}}, {"write": {"file": "a.vtu"}}]},
-    {"name": "vortices", "stages": [{"q_criterion": {"field": "u"}}, {"contour": {"field": "q_criterion", "values": [0.05]}}, {"write": {"file": "a.vtu"}}]}"#;
+    {"name": "gradient", "stages": [{"gradient": {"field": "p"}}, {"write": {"file": "gradient.vtu"}}]},
+    {"name": "gradient of a vector", "stages": [{"gradient": {"field": "u", "name": "du"}}, {"write": {"file": "gradient-of-a-vector.vtu"}}]},
+    {"name": "gradient in cells", "stages": [{"gradient": {"field": "load"}}, {"write": {"file": "gradient-in-cells.vtu"}}]},
+    {"name": "vorticity", "stages": [{"vorticity": {"field": "u"}}, {"write": {"file": "vorticity.vtu"}}]},
+    {"name": "vorticity in cells", "stages": [{"vorticity": {"field": "flux", "name": "turning"}}, {"write": {"file": "vorticity-in-cells.vtu"}}]},
+    {"name": "divergence", "stages": [{"divergence": {"field": "u"}}, {"write": {"file": "divergence.vtu"}}]},
+    {"name": "q", "stages": [{"q_criterion": {"field": "u"}}, {"write": {"file": "q.vtu"}}]},
+    {"name": "magnitude", "stages": [{"magnitude": {"field": "flux"}}, {"write": {"file": "magnitude.vtu"}}]},
+    {"name": "vortices", "stages": [{"q_criterion": {"field": "u"}}, {"contour": {"field": "q_criterion", "values": [0.05]}}, {"write": {"file": "vortices.vtu"}}]}"#;
 
 /// What the pipelines write of a part, by the names of the pipelines.
 fn made(
