@@ -14,7 +14,7 @@ import { withdrawalOf } from "../store/orders";
 import type { Withdrawal } from "../store/orders";
 import { nameOf, whyNotSteering } from "../store/run";
 import type { OrderPhase, OrderRecord, State } from "../store/state";
-import { sameJson } from "../store/store";
+import { sameJson, sameParts } from "../store/store";
 import type { Store } from "../store/store";
 import { floored, passingPart, percent } from "../store/verdict";
 
@@ -69,7 +69,7 @@ export class EditsPanel {
       this.rows.list = put(this.list, this.rows.list, this.stack.map((edit, i) => {
         const title = titleOf(edit, state.form);
         return { key: String(i), of: [edit, title, this.renaming === i], order: by[i] ?? null, make: () => this.row(edit, i, title) };
-      }));
+      }), (now, before) => now.every((part, k) => sameJson(part, before[k])));
     }
     this.markDrag();
     part("stack-empty").hidden = this.stack.length > 0 || state.orders.some(isPending);
@@ -335,11 +335,10 @@ export class EditsPanel {
 }
 
 /** Puts rows into a list. One that is of the same as before stays, so that a press on it is not lost while orders go on. */
-function put(list: HTMLElement, before: Rows, wanted: readonly WantedRow[]): Rows {
+function put(list: HTMLElement, before: Rows, wanted: readonly WantedRow[], same: (a: readonly unknown[], b: readonly unknown[]) => boolean = sameParts): Rows {
   const rows = new Map(wanted.map(({ key, of, order, make }): [string, Row] => {
     const known = before.get(key);
-    const isSame = known?.of.length === of.length && of.every((part, i) => sameJson(part, known.of[i]));
-    const row = { ...(isSame ? known : make()), of };
+    const row = { ...(known && same(of, known.of) ? known : make()), of };
     row.show(order);
     return [key, row];
   }));
