@@ -196,7 +196,7 @@ fn assert_page_agrees(shown: &Value, report: &Value) {
     ] {
         assert_shown(label, &shown[place][label], &last(name), 4);
     }
-    // What rounding leaves is another number at each cycle, and the plots come a moment behind.
+    // The mass balance is rounding alone: another number at each cycle, of which the plots show an earlier one.
     let balance = shown["dock"]["Mass balance, flow rate [m3/s]"].as_str().unwrap_or_default();
     let is_measured = last("mass balance.flow_rate").is_f64();
     assert!(is_measured && number(balance).is_finite(), "the page shows the balance \"{balance}\"");

@@ -84,7 +84,7 @@ fn a_trigger_does_not_flap_and_sets_parameters() {
     );
 }
 
-/// What is not known for a while breaks what has held, and is told as such.
+/// A step without the channel makes every monitor NaN and begins the wait of `for` anew.
 #[test]
 fn a_channel_that_is_missing_is_no_value() {
     let mut runner = runner(

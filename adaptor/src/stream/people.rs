@@ -40,7 +40,7 @@ impl Hub {
         } else {
             together.names.insert(client, called.to_owned())
         };
-        // Who says again what is known has nobody told.
+        // A name that has not changed is told to nobody.
         if before.as_deref().unwrap_or_default() != called {
             together.changed();
         }

@@ -330,7 +330,7 @@ struct Fields {
     fields: Vec<(Field, usize)>,
     points: usize,
     cells: usize,
-    /// The fields of a rank that has no point or no cell of the extract.
+    /// The fields of the rank without a point or a cell of the extract that knows most of them.
     without_values: Vec<Field>,
     /// Fields of the mesh as a whole, from the lowest rank that brings it.
     of_mesh: Vec<Field>,

@@ -364,8 +364,7 @@ mod tests {
         assert_eq!(read(JOURNAL, "r2").unwrap(), Since::default());
     }
 
-    /// A disk that did not answer had the order refused, and wrote its lines after all; its client gave it
-    /// again.
+    /// A slow disk has an order refused and writes its lines after all; its client then gives it again.
     #[test]
     fn an_order_that_is_given_again_after_it_was_refused_is_open() {
         let again = r#"{"id":"open","status":"accepted","cycle":6,"time":0,"order":{"undo":3},"by":{"viewer":"c2"}}

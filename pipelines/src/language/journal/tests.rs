@@ -34,7 +34,7 @@ fn only_what_took_effect_in_the_newest_run_is_carried_out_again() {
     assert!(!is_journal("{\"version\": 1}\n") && !is_journal("cycle,time\n"));
 }
 
-/// What counts is what was given again after it was taken back, with its own text.
+/// An order that is given again after it was rejected is carried out with its new text.
 #[test]
 fn an_order_that_is_given_again_is_carried_out_as_it_is_then() {
     let text = r#"{"run":{"id":"1","version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":1}}}

@@ -236,8 +236,8 @@ impl Prepared {
         measured
     }
 
-    /// Where the channel is not there or cannot be used: the monitors have no value, and what the
-    /// condition has waited for is not known to have lasted. Returns the values of the monitors.
+    /// Takes a step in which the channel is missing or cannot be used: every monitor is NaN, and the
+    /// condition has to hold anew for as long as `for` says. Returns the values of the monitors.
     pub(super) fn without_channel(
         &mut self,
         snapshot: &Snapshot,
@@ -251,7 +251,7 @@ impl Prepared {
         unknown
     }
 
-    /// What is told of the values of the monitors; nothing where there are none.
+    /// The message that tells the values of the monitors; `None` for a pipeline without monitors.
     fn told(&self, cycle: u64, time: f64, values: &[f64]) -> Option<Output> {
         let names = self.monitors.iter().map(|monitor| monitor.name.clone());
         (!values.is_empty()).then(|| {
