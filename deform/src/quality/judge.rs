@@ -69,6 +69,7 @@ pub fn shape_at(start: Vector, end: Vector, fraction: f64) -> Vector {
 ///   same way, and bounds of it everywhere inside; of prisms and polyhedra the tetrahedra that they
 ///   are split into (see [`scaled_jacobian`](super::scaled_jacobian)).
 /// - In a mesh of polygons, no corner turns against the polygon's normal at the start.
+/// - A cell whose vertices all stay where the reference mesh has them passes, however it is there.
 ///
 /// Cost: one pass over the cells, on all threads; tetrahedra are read once, four at a time, whatever
 /// the number of shapes. Only a refusal costs more (the bisection for the
@@ -468,7 +469,7 @@ impl<'a> Path<'a> {
                 (value, at) = (scaled, least.at);
             }
         }
-        if inverts || value < self.floor {
+        if (inverts || value < self.floor) && !self.rests(cell) {
             let cells = self.measure.cells;
             part.fail(FailingCell {
                 cell: self.domain.cell_number(cell),
@@ -556,8 +557,19 @@ impl<'a> Path<'a> {
     fn cell_fails(&self, cell: usize, fraction: f64, memory: &mut Memory) -> bool {
         let (value, inverted) = self.quality_at(cell, fraction, memory);
         let ends = &mut memory.ends;
-        inverted
-            || value < self.floor
-            || !least_on_path(&self.measure, cell, self.start, self.end, fraction, ends).positive
+        let is_valid = |ends| {
+            least_on_path(&self.measure, cell, self.start, self.end, fraction, ends).positive
+        };
+        (inverted || value < self.floor || !is_valid(ends)) && !self.rests(cell)
+    }
+
+    /// Whether a cell stays on the whole path as the solver itself has it in the reference mesh.
+    fn rests(&self, cell: usize) -> bool {
+        let reference = self.domain.mesh().points();
+        self.measure.cells.vertices(cell).iter().all(|&vertex| {
+            [self.start, self.end]
+                .iter()
+                .all(|shape| shape[vertex as usize] == reference[vertex as usize])
+        })
     }
 }

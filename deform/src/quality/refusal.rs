@@ -40,7 +40,8 @@ pub struct BrokenPath {
     pub worst: Vec<FailingCell>,
     /// How far along the path a mesh can go, in one straight step, with every cell valid all the
     /// way and above the floor at its end. 0 where not at all; below what is possible by at most
-    /// one part in a million.
+    /// one part in a million. Of a request that is [refused](crate::shape::Refused): the fraction of
+    /// its edits' amounts that passes.
     pub feasible_fraction: f64,
     /// How many boundary faces have at the end of the path a normal that points against the one
     /// they started with. Where this is not 0, the prescribed surface folds over itself or turns by

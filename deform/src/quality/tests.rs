@@ -289,6 +289,40 @@ fn polygons_must_not_fold_over() {
     assert!(path.inverted > 0 && path.folded_faces > 0);
 }
 
+/// A dart has a corner that turns against its normal, which no order has made.
+#[test]
+fn a_cell_that_is_broken_in_the_reference_hinders_only_what_moves_it() {
+    let points = vec![
+        [0.0, 0.0, 0.0],
+        [2.0, 1.0, 0.0],
+        [0.0, 2.0, 0.0],
+        [0.5, 1.0, 0.0],
+        [5.0, 0.0, 0.0],
+        [6.0, 0.0, 0.0],
+        [5.0, 1.0, 0.0],
+    ];
+    let mut cells = Cells::new();
+    cells.push(CellType::Quad, &[0, 1, 2, 3]).unwrap();
+    cells.push(CellType::Triangle, &[4, 5, 6]).unwrap();
+    let mesh = Mesh::new(points, cells, FeatureSource::SharpEdges).unwrap();
+    let moved = |vertex: usize, by: f64| {
+        let mut end = mesh.points().to_vec();
+        end[vertex][1] += by;
+        end
+    };
+    let guard = Guard::default();
+    let allows = |end: &[Vector]| {
+        let judged = judge(&mesh, mesh.points(), end, &[0.5, 1.0], &guard);
+        assert_eq!(judged.is_ok(), keeps(&mesh, mesh.points(), end, &guard));
+        judged.is_ok()
+    };
+    assert!(allows(&moved(6, 0.5)), "the dart rests");
+    assert!(!allows(&moved(6, -2.0)), "the triangle turns over");
+    assert!(!allows(&moved(1, 0.1)), "the dart moves");
+    let shifted = moved(1, 0.1);
+    assert!(judge(&mesh, &shifted, &shifted, &[1.0], &guard).is_err(), "it rests elsewhere");
+}
+
 #[test]
 fn senseless_arguments_are_named() {
     let mesh = one_tet();

@@ -15,7 +15,7 @@ use super::carry::Carrier;
 use super::plan::{CurrentShape, Plan, travel};
 use super::{
     Deformation, Phase, Refused, Request, ShapeSeconds, Shaper, Target, check_stack, displaced,
-    moved, require_plane,
+    moved,
 };
 use crate::communicator::Communicator;
 
@@ -26,6 +26,15 @@ const KEPT: usize = 4;
 /// to be searched for.
 const PROBES: usize = 9;
 const FINE: f64 = 1.0 / 128.0;
+
+/// Fractions that are tried before one is told as feasible.
+const CONFIRMATIONS: usize = 4;
+
+/// A fraction below this is none.
+const LEAST: f64 = 1e-6;
+
+/// What passes is not at the very edge, where the last bit decides.
+const ROUNDED_DOWN: f64 = 1.0 - 1e-6;
 
 /// A shape and all that it is a function of.
 pub(super) struct Mended {
@@ -135,13 +144,7 @@ fn displacement(
     carrier: Option<&Carrier>,
     in_plane: bool,
 ) -> Result<Vec<Vector>, Refused> {
-    let displaced = displaced(editor, stack).and_then(|displacement| {
-        if let (Some(surface), true) = (body.surface(), in_plane) {
-            require_plane(surface.points(), &displacement)?;
-        }
-        Ok(displacement)
-    });
-    let displacement = body.scatter(displaced)?;
+    let displacement = body.scatter(displaced(editor, stack, in_plane))?;
     match carrier {
         Some(carrier) => carrier.settle(displacement),
         None => Ok(displacement),
@@ -190,9 +193,46 @@ impl Shaper {
             Otherwise::Clamp => self.clamped(request),
             _ => {
                 let target = self.target(stack, deformation, guard)?;
-                self.go(start, &target, schedule, guard)
+                match self.go(start, &target, schedule, guard) {
+                    Err(refused) if refused.is_quality() => self.confirmed(request, refused),
+                    plan => plan,
+                }
             }
         }
+    }
+
+    /// The refusal of a request, with a feasible fraction that was tried: that of the straight way to
+    /// its shape is another where edits turn or shapes are improved.
+    ///
+    /// # Errors
+    /// Always: the refusal, or that it was given up.
+    fn confirmed(&mut self, request: &Request, refused: Refused) -> Result<Plan, Refused> {
+        let Some(mut fraction) = refused.feasible_fraction() else { return Err(refused) };
+        if request.kept >= request.stack.len() {
+            return Err(refused);
+        }
+        for _ in 0..CONFIRMATIONS {
+            if fraction <= LEAST {
+                break;
+            }
+            let passes = match self.part(request, fraction * ROUNDED_DOWN) {
+                Ok(_) => return self.body.agree(Err(refused.with_feasible_fraction(fraction))),
+                Err(refused) if refused.is_cancelled() => return Err(refused),
+                Err(refused) => refused.feasible_fraction().filter(|passes| *passes < 1.0),
+            };
+            fraction *= passes.unwrap_or(0.5);
+        }
+        self.body.agree(Err(refused.with_feasible_fraction(0.0)))
+    }
+
+    /// The way to the shape of a fraction of the edits after those that are kept.
+    fn part(&mut self, request: &Request, fraction: f64) -> Result<Plan, Refused> {
+        let Request { stack, kept, start, deformation, schedule, guard } = request;
+        let scaled: Vec<Edit> = (stack.iter().enumerate())
+            .map(|(index, edit)| if index < *kept { edit.clone() } else { edit.scaled(fraction) })
+            .collect();
+        let target = self.target(&scaled, deformation, guard)?;
+        self.go(start, &Target { fraction, ..target }, schedule, guard)
     }
 
     /// The way from `start` to a target.
@@ -386,51 +426,34 @@ impl Shaper {
 
     /// The largest fraction of the edits after those that are kept that the guard lets through.
     fn clamped(&mut self, request: &Request) -> Result<Plan, Refused> {
-        let Request { stack, kept, start, deformation: deform, schedule, guard } = request;
-        let kept = *kept;
-        let whole = self.target(stack, deform, guard);
+        let Request { stack, kept, start, deformation, schedule, guard } = request;
+        let whole = self.target(stack, deformation, guard);
         let refused = match whole.and_then(|whole| self.go(start, &whole, schedule, guard)) {
             Err(refused)
-                if (refused.is_quality() || refused.is_surface()) && kept < stack.len() =>
+                if (refused.is_quality() || refused.is_surface()) && *kept < stack.len() =>
             {
                 refused
             }
             other => return other,
         };
-        let mut part = |fraction: f64| -> Result<Option<Plan>, Refused> {
-            let scaled: Vec<Edit> = stack
-                .iter()
-                .enumerate()
-                .map(
-                    |(index, edit)| if index < kept { edit.clone() } else { edit.scaled(fraction) },
-                )
-                .collect();
-            let target = self.target(&scaled, deform, guard);
-            match target
-                .and_then(|target| self.go(start, &Target { fraction, ..target }, schedule, guard))
-            {
-                Ok(plan) => Ok(Some(plan)),
-                Err(refused) if refused.is_cancelled() => Err(refused),
-                // A part may be refused for what the whole is not, such as leaving its plane on the way.
-                Err(_) => Ok(None),
-            }
-        };
         // The shapes of most edits lie on a straight way, on which the fraction is known.
         let (mut low, mut high, mut best) = (0.0, 1.0, None::<Plan>);
-        let mut guess = refused.feasible_fraction().unwrap_or(0.5) * (1.0 - 1e-6);
+        let mut guess = refused.feasible_fraction().unwrap_or(0.5) * ROUNDED_DOWN;
         for _ in 0..PROBES {
-            if !(guess > 1e-6 && guess < 1.0) {
+            if !(guess > LEAST && guess < 1.0) {
                 guess = 0.5 * (low + high);
             }
             let before = std::mem::replace(&mut guess, f64::NAN);
-            match part(before)? {
-                Some(plan) => {
+            match self.part(request, before) {
+                Ok(plan) => {
                     if best.is_none() {
                         guess = before + FINE;
                     }
                     (low, best) = (before, Some(plan));
                 }
-                None => high = before,
+                Err(refused) if refused.is_cancelled() => return Err(refused),
+                // A part may be refused for what the whole is not, such as leaving its plane on the way.
+                Err(_) => high = before,
             }
             if high - low <= FINE {
                 break;

@@ -386,10 +386,7 @@ impl Shaper {
         let watch = self.stopwatch(Phase::Surface);
         let body = Arc::clone(&self.body);
         let in_plane = self.in_plane;
-        let displaced = displaced(self.editor.as_mut(), stack).and_then(|displacement| {
-            if let (Some(surface), true) = (body.surface(), in_plane) {
-                require_plane(surface.points(), &displacement)?;
-            }
+        let displaced = displaced(self.editor.as_mut(), stack, in_plane).and_then(|displacement| {
             // Where a part of the surface is let go, it is looked at where it ends.
             if let (Some(surface), false, SurfaceRule::Reject) =
                 (body.surface(), deform.lets_go() && !deform.surface_only, rule)
@@ -473,17 +470,22 @@ impl Shaper {
     }
 }
 
-/// The displacement of the surface that a stack makes, where the surface is.
-fn displaced(editor: Option<&mut Editor>, stack: &[Edit]) -> Result<Vec<Vector>, Refused> {
-    editor.map_or_else(
-        || Ok(Vec::new()),
-        |editor| {
-            editor.displacement(stack).map_err(|error| match error {
-                EditError::Cancelled => Refused::Cancelled,
-                error => error.into(),
-            })
-        },
-    )
+/// The displacement of the surface that a stack makes, where the surface is; `in_plane` refuses one
+/// along z.
+fn displaced(
+    editor: Option<&mut Editor>,
+    stack: &[Edit],
+    in_plane: bool,
+) -> Result<Vec<Vector>, Refused> {
+    let Some(editor) = editor else { return Ok(Vec::new()) };
+    let displacement = editor.displacement(stack).map_err(|error| match error {
+        EditError::Cancelled => Refused::Cancelled,
+        error => error.into(),
+    })?;
+    if in_plane {
+        require_plane(editor.surface().points(), &displacement)?;
+    }
+    Ok(displacement)
 }
 
 /// What is out of the plane by less than this part of the largest displacement is rounding.

@@ -168,8 +168,9 @@ impl Refused {
         }
     }
 
-    /// The fraction that would pass: of the way, or of the amount of the edit that cannot be
-    /// followed.
+    /// The fraction that would pass: of the amounts of the edits that are not kept, as it was tried; of
+    /// the way, where there are none; or of the amount of the edit that cannot be followed. 0 where
+    /// none is known.
     #[must_use]
     pub fn feasible_fraction(&self) -> Option<f64> {
         match self {
@@ -179,6 +180,14 @@ impl Refused {
             Refused::Elsewhere(elsewhere) => elsewhere.feasible_fraction,
             _ => None,
         }
+    }
+
+    /// The refusal of a broken way, of which this fraction passes.
+    pub(super) fn with_feasible_fraction(mut self, fraction: f64) -> Self {
+        if let Refused::Guard(Refusal::Quality(path)) = &mut self {
+            path.feasible_fraction = fraction;
+        }
+        self
     }
 
     /// The place of the worst cell before the change, or of the first face of the surface that is

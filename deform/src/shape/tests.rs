@@ -384,6 +384,43 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
     }
 }
 
+/// Edits that turn, and shapes that were improved, do not lie on the straight way to the whole.
+#[test]
+fn the_fraction_that_is_told_of_a_refused_order_passes() {
+    let mesh = box_of_tets([6, 6, 6], [0.0; 3], [1.0; 3]);
+    let turn = json!({"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}});
+    let squeeze = json!({"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [0.05, 0.05, 1]}});
+    let sink =
+        json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0, -1.4]}});
+    let slight =
+        json!({"translate": {"features": ["x-max"], "fixed": ["x-min"], "by": [0.1, 0, 0]}});
+    let guard = Guard { surface: SurfaceRule::Allow, ..Guard::default() };
+    for edits in
+        [json!([turn]), json!([slight, turn]), json!([slight, squeeze, sink]), json!([sink])]
+    {
+        let edits = stack(edits);
+        let kept = edits.len() - 1;
+        let mut shaper = alone(&mesh);
+        let before = Request { guard, ..asked(&shaper, &edits[..kept], &Deformation::default()) };
+        let start = shaper.plan(&before).unwrap().target().reached();
+        let whole = Request {
+            kept,
+            start,
+            ..Request { guard, ..asked(&shaper, &edits, &Deformation::default()) }
+        };
+        let refused = shaper.plan(&whole).unwrap_err();
+        let fraction = refused.feasible_fraction().unwrap();
+        assert!(fraction > 0.1 && fraction < 1.0, "{refused}");
+        let mut part = edits.clone();
+        part[kept] = edits[kept].scaled(fraction * (1.0 - 1e-6));
+        let passes = shaper.plan(&Request { stack: part.into(), ..whole.clone() });
+        assert!(passes.is_ok(), "{fraction}: {}", passes.unwrap_err());
+        let clamp = Guard { otherwise: Otherwise::Clamp, ..guard };
+        let clamped = shaper.plan(&Request { guard: clamp, ..whole }).unwrap().target().fraction;
+        assert!((clamped - fraction).abs() < 0.1, "{clamped} {fraction}");
+    }
+}
+
 /// It is by the points themselves that a plan is known to begin where the mesh is.
 #[test]
 fn a_way_over_other_shapes_begins_with_the_start_that_was_asked_for() {

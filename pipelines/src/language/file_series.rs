@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use super::pipeline::Pipeline;
-use super::stage::{Action, Stage, Write};
+use super::stage::{FileSink, Write};
 
 /// The .pvd series of the files that a pipeline's pattern stands for, and how many of them stay.
 /// There is no series where each step writes the same file. It lies in the folder that all of them
@@ -31,17 +31,12 @@ pub(crate) fn series_of(
     (Some(format!("{folder}{name}{number}.pvd")), keep)
 }
 
-/// What a pipeline writes, among its stages and its actions.
+/// The stages and actions of a pipeline that write meshes.
 fn writes(pipeline: &Pipeline) -> impl Iterator<Item = &Write> {
-    let stages = pipeline.stages.iter().filter_map(|stage| match stage {
-        Stage::Write(write) => Some(write),
-        _ => None,
-    });
-    let actions = pipeline.then.iter().filter_map(|action| match action {
-        Action::Write(write) => Some(write),
-        _ => None,
-    });
-    stages.chain(actions)
+    pipeline.file_sinks().filter_map(|sink| match sink {
+        FileSink::Write(write) => Some(write),
+        FileSink::Csv(_) | FileSink::Render(_) => None,
+    })
 }
 
 #[cfg(test)]

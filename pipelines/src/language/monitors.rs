@@ -1,13 +1,13 @@
 //! The monitors of pipelines: their names and units, and what of them a pipeline may name.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::configuration::Config;
 use super::derived::{Formula, PARAMETER};
 use super::pipeline::{AgainAfter, Due, Pipeline};
-use super::stage::{Action, Stage};
+use super::stage::{Action, FileSink, Stage};
 use super::unread::Found;
-use super::{Csv, Log, Parameter, Problem, Problems, Render, Write, nearest};
+use super::{Csv, Log, Parameter, Problem, Problems, nearest};
 use crate::expression::{Expression, UsedName};
 use crate::limits::{BINS, HISTORY};
 
@@ -307,7 +307,8 @@ pub(crate) fn line(log: &Log, scope: &Scope<'_>) -> Result<Line, Problem> {
 
 /// Checks of all pipelines what they say of each other's monitors.
 pub(super) fn check(config: &Config, found: &mut Found) {
-    let mut files = Vec::new();
+    // Each file, with the pipeline that writes it.
+    let mut files = HashMap::new();
     let mut databases = HashSet::new();
     let faulty = found.parts();
     let monitored = Monitored::of(&config.pipelines);
@@ -319,24 +320,23 @@ pub(super) fn check(config: &Config, found: &mut Found) {
         // A stage with another fault is told of that.
         let is_new = |problem: &Problem| problem.part().is_none_or(|part| !faulty.contains(&part));
         twice.into_iter().map(located).filter(is_new).for_each(|problem| found.push(problem));
-        let tables = tables(pipeline).map(|table| &table.file);
-        for file in tables.chain(written(pipeline).map(|write| &write.file)) {
-            if files.contains(&(file, index)) {
-                continue;
-            }
-            if files.iter().any(|(known, _)| *known == file) {
-                let message = format!("another pipeline writes the file `{file}`");
-                found.push(located(Problem::new(message)));
-            }
-            files.push((file, index));
-        }
-        for render in pictures(pipeline).filter(|render| render.is_database()) {
-            if !databases.insert(&render.file) {
-                let message = format!(
-                    "two `render` write the database `{}`, where their pictures would be called \
-                     alike; expected one for each",
-                    render.file
-                );
+        for sink in pipeline.file_sinks() {
+            let file = sink.file();
+            let message = match sink {
+                FileSink::Csv(_) | FileSink::Write(_) => {
+                    let is_other = *files.entry(file).or_insert(index) != index;
+                    is_other.then(|| format!("another pipeline writes the file `{file}`"))
+                }
+                FileSink::Render(render) => {
+                    (render.is_database() && !databases.insert(file)).then(|| {
+                        format!(
+                            "two `render` write the database `{file}`, where their pictures would \
+                             be called alike; expected one for each"
+                        )
+                    })
+                }
+            };
+            if let Some(message) = message {
                 found.push(located(Problem::new(message)));
             }
         }
@@ -435,39 +435,6 @@ impl Parameters<'_> {
             .try_for_each(|slot| self.check_slot(&slot))
             .map_err(|problem| problem.within("message"))
     }
-}
-
-fn tables(pipeline: &Pipeline) -> impl Iterator<Item = &Csv> {
-    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
-        Stage::Csv(csv) => Some(csv),
-        _ => None,
-    });
-    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
-        Action::Csv(csv) => Some(csv),
-        _ => None,
-    }))
-}
-
-fn written(pipeline: &Pipeline) -> impl Iterator<Item = &Write> {
-    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
-        Stage::Write(write) => Some(write),
-        _ => None,
-    });
-    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
-        Action::Write(write) => Some(write),
-        _ => None,
-    }))
-}
-
-fn pictures(pipeline: &Pipeline) -> impl Iterator<Item = &Render> {
-    let of_stages = pipeline.stages.iter().filter_map(|stage| match stage {
-        Stage::Render(render) => Some(&**render),
-        _ => None,
-    });
-    of_stages.chain(pipeline.then.iter().filter_map(|action| match action {
-        Action::Render(render) => Some(&**render),
-        _ => None,
-    }))
 }
 
 /// The problems of the names that a pipeline uses, and of those that it defines twice.

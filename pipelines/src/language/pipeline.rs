@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::schedule::{Every, Interval};
 
-use super::stage::{Action, Stage};
+use super::stage::{Action, FileSink, Stage};
 
 /// Stages that run one after the other at some steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +49,12 @@ impl Pipeline {
     pub fn can_order(&self) -> bool {
         self.stages.iter().any(|stage| matches!(stage, Stage::Order(_)))
             || self.then.iter().any(|action| matches!(action, Action::Order(_)))
+    }
+
+    /// Its stages and actions that write files.
+    pub(crate) fn file_sinks(&self) -> impl Iterator<Item = FileSink<'_>> {
+        let of_stages = self.stages.iter().filter_map(Stage::file_sink);
+        of_stages.chain(self.then.iter().filter_map(Action::file_sink))
     }
 }
 

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::pipeline::{Due, Pipeline};
-use super::stage::{Action, Stage};
+use super::stage::{FileSink, Stage};
 use super::{Config, Problem, Problems, Validate, check_parameters, nearest};
 use crate::limits::PIPELINES;
 
@@ -206,31 +206,21 @@ pub(super) fn check_steered(before: &Config, after: &Config) -> Result<(), Probl
 
 /// Refuses a pipeline that names a file which one that comes over the network may not name.
 pub(super) fn check_files(pipeline: &Pipeline) -> Result<(), Problem> {
+    let check = |sink: Option<FileSink<'_>>| {
+        sink.map_or(Ok(()), |sink| check_written(sink.file(), pipeline))
+    };
     for (index, stage) in pipeline.stages.iter().enumerate() {
-        let written = match stage {
-            Stage::Displacement(import) if import.file.is_some() => {
-                let message = "found the name of a file; what comes over the network names no \
-                               files of this machine, expected `vertices` and `values`";
-                let problem = Problem::new(message).within("file").within(stage.name());
-                return Err(problem.at(index).within("stages"));
-            }
-            Stage::Write(write) => Some(&write.file),
-            Stage::Csv(csv) => Some(&csv.file),
-            Stage::Render(render) => Some(&render.file),
-            _ => None,
-        };
         let located = |problem: Problem| problem.within(stage.name()).at(index).within("stages");
-        written.map_or(Ok(()), |file| check_written(file, pipeline)).map_err(located)?;
+        if matches!(stage, Stage::Displacement(import) if import.file.is_some()) {
+            let message = "found the name of a file; what comes over the network names no \
+                           files of this machine, expected `vertices` and `values`";
+            return Err(located(Problem::new(message).within("file")));
+        }
+        check(stage.file_sink()).map_err(located)?;
     }
     for (index, action) in pipeline.then.iter().enumerate() {
-        let written = match action {
-            Action::Write(write) => Some(&write.file),
-            Action::Csv(csv) => Some(&csv.file),
-            Action::Render(render) => Some(&render.file),
-            _ => None,
-        };
         let located = |problem: Problem| problem.within(action.name()).at(index).within("then");
-        written.map_or(Ok(()), |file| check_written(file, pipeline)).map_err(located)?;
+        check(action.file_sink()).map_err(located)?;
     }
     Ok(())
 }

@@ -240,6 +240,37 @@ impl Stage {
     }
 }
 
+/// A stage or an action that writes files.
+#[derive(Clone, Copy)]
+pub(crate) enum FileSink<'a> {
+    Write(&'a Write),
+    Csv(&'a Csv),
+    Render(&'a Render),
+}
+
+impl<'a> FileSink<'a> {
+    /// The name of its files, as it is written in the configuration.
+    pub(crate) fn file(self) -> &'a str {
+        match self {
+            FileSink::Write(write) => &write.file,
+            FileSink::Csv(csv) => &csv.file,
+            FileSink::Render(render) => &render.file,
+        }
+    }
+}
+
+impl Stage {
+    /// The stage as one that writes files, if it is.
+    pub(crate) fn file_sink(&self) -> Option<FileSink<'_>> {
+        match self {
+            Stage::Write(write) => Some(FileSink::Write(write)),
+            Stage::Csv(csv) => Some(FileSink::Csv(csv)),
+            Stage::Render(render) => Some(FileSink::Render(render)),
+            _ => None,
+        }
+    }
+}
+
 /// An action of a pipeline whose condition holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
@@ -266,6 +297,16 @@ pub enum Action {
 }
 
 impl Action {
+    /// The action as one that writes files, if it is.
+    pub(crate) fn file_sink(&self) -> Option<FileSink<'_>> {
+        match self {
+            Action::Write(write) => Some(FileSink::Write(write)),
+            Action::Csv(csv) => Some(FileSink::Csv(csv)),
+            Action::Render(render) => Some(FileSink::Render(render)),
+            _ => None,
+        }
+    }
+
     /// The action's key in JSON.
     #[must_use]
     pub fn name(&self) -> &'static str {
