@@ -387,6 +387,17 @@ fn a_replay_is_watched_and_not_steered() {
     viewer.send(&json!({"id": "b", "cancel": {"order": "a"}}));
     let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "b");
     assert!(error["message"].as_str().unwrap().contains("replays a journal"), "{error}");
+    // Another view is no steering; how orders are carried out is.
+    let view = json!({"name": "half", "stages": [
+        {"slice": {"origin": [0.5, 0.5, 0.5], "normal": [1.0, 0.0, 0.0]}}, {"stream": {}}]});
+    viewer.send(&json!({"id": "c", "pipelines": {"set": [view]}}));
+    solver.step_until_told(&mut viewer, "pipelines", |told| {
+        told["id"] == "c" && told["status"] == "applied"
+    });
+    let shape = json!({"name": "carried out", "on": "order", "stages": [{"guard": {"otherwise": "clamp"}}]});
+    viewer.send(&json!({"id": "d", "pipelines": {"set": [shape]}}));
+    let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "d");
+    assert!(error["message"].as_str().unwrap().contains("replays a journal"), "{error}");
     viewer.send(&json!({"stop": {}}));
     solver.step_until("the stop", |solver| solver.stopped);
     // The pipeline of this configuration has given orders, which no journal holds.

@@ -97,7 +97,7 @@ impl Adaptor {
     /// Collective.
     pub(super) fn make_changes(&mut self, moment: Moment, channels: &[Channel<'_>]) {
         for WaitingChange { id, source, change, .. } in std::mem::take(&mut self.waiting_changes) {
-            let made = self.make_change(&change, moment, channels);
+            let made = self.make_change(&change, &source, moment, channels);
             self.changes.settle(&id, made.is_ok(), &self.config);
             self.settle(
                 PIPELINES,
@@ -124,16 +124,27 @@ impl Adaptor {
     fn make_change(
         &mut self,
         change: &PipelineChange,
+        source: &Source,
         moment: Moment,
         channels: &[Channel<'_>],
     ) -> Result<Changed, String> {
+        let changes_orders = change.changes_orders(&self.config);
+        if changes_orders && self.is_replay && matches!(source, Source::Viewer(_)) {
+            return Err(
+                "this run replays a journal: how its orders are carried out is in the journal"
+                    .into(),
+            );
+        }
         let config = self.changes.after(change, &self.config).map_err(|it| it.to_string())?;
         self.check_orders(&config)?;
         self.check_features_of(change.pipelines())?;
         let (parameters, hub) = (self.parameters.all(), self.hub.as_ref());
         let changed = self.pipelines.replace(&config, moment, channels, parameters, hub)?;
         self.config = Arc::new(config);
-        self.defaults = Defaults::of(&self.config);
+        // A replay has others than its configuration's, until its journal changes them.
+        if changes_orders {
+            self.defaults = Defaults::of(&self.config);
+        }
         if let SteeredMesh::Steered(steerer, _) = &mut self.mesh {
             steerer.set_defaults(&self.defaults);
             if self.pipelines.can_order() {

@@ -76,6 +76,20 @@ impl PipelineChange {
         }
     }
 
+    /// Whether it changes how orders are carried out: it brings a pipeline that runs on orders, or
+    /// replaces or removes one of `before`.
+    #[must_use]
+    pub fn changes_orders(&self, before: &Config) -> bool {
+        let on_order = |pipeline: &Pipeline| pipeline.due == Due::OnOrder;
+        let goes = |known: &Pipeline| match self {
+            PipelineChange::All(_) => true,
+            PipelineChange::Set(pipelines) => pipelines.iter().any(|new| new.name == known.name),
+            PipelineChange::Remove(names) => names.contains(&known.name),
+        };
+        self.pipelines().iter().any(on_order)
+            || before.pipelines.iter().any(|known| on_order(known) && goes(known))
+    }
+
     /// The configuration with the change made, whole and valid: also what pipelines say of each
     /// other's monitors, and the parameters that they name, of which the solver has `parameters`.
     ///
