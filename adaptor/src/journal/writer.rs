@@ -13,7 +13,7 @@ use std::{
 
 use tombolo_pipelines::{
     language::{CheckpointNote, JournalEntry, JournalNote, LostLines, OrderStatus, RunHeader},
-    limits::{DOCUMENT, WAITING, WAITING_BYTES},
+    limits::{DOCUMENT, Exceeded, VALUES, WAITING, WAITING_BYTES},
 };
 
 use super::{
@@ -131,6 +131,21 @@ impl Journal {
         self.push(line(entry));
     }
 
+    /// Hands a line over to be written, unless nobody who reads the journal would take it. Never
+    /// waits.
+    ///
+    /// # Errors
+    /// The limit that it exceeds.
+    pub(crate) fn try_write(&self, entry: &JournalEntry) -> Result<(), Exceeded> {
+        if !self.is_kept() {
+            return Ok(());
+        }
+        let text = line(entry);
+        check(&text)?;
+        self.push(text);
+        Ok(())
+    }
+
     /// Hands a line about the run over to be written. Never waits.
     pub(crate) fn note(&self, note: &JournalNote) {
         self.push(line(note));
@@ -208,7 +223,7 @@ impl Journal {
         };
         let (text, taken_back) = (line(entry), line(&taken_back));
         // Numbers may take more letters than they came in.
-        if let Err(exceeded) = DOCUMENT.check(text.len()) {
+        if let Err(exceeded) = check(&text) {
             return settle(Err(format!("{exceeded}, in its line of the journal")));
         }
         let mut state = lock(&shared.state);
@@ -450,6 +465,15 @@ fn line(of: &impl serde::Serialize) -> Vec<u8> {
     let mut line = serde_json::to_vec(of).unwrap_or_default();
     line.push(b'\n');
     line
+}
+
+/// Whether a line is one that is read: a run that goes on, or a replay, reads it with the limits of a
+/// document.
+fn check(line: &[u8]) -> Result<(), Exceeded> {
+    DOCUMENT.check(line.len())?;
+    // A value begins a list or an object, or follows a comma.
+    let begins = |letter: &&u8| matches!(letter, b',' | b'[' | b'{');
+    VALUES.check(line.iter().filter(begins).count() + 1)
 }
 
 #[cfg(test)]

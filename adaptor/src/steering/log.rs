@@ -93,7 +93,7 @@ impl Log {
     /// journal, tells the viewers of an order. Never waits for the disk.
     ///
     /// # Errors
-    /// Where another command has that name already.
+    /// Where another command has that name already, or the journal has no room for its line.
     pub(crate) fn accept(
         &self,
         wanted: Option<String>,
@@ -109,7 +109,10 @@ impl Log {
             state.name(wanted, None)?
         };
         let (Named::New(id) | Named::Again(id)) = named;
-        self.journal.write(&accepted(&id, source, command, moment));
+        if let Err(exceeded) = self.journal.try_write(&accepted(&id, source, command, moment)) {
+            self.forget(&id);
+            return Err(format!("'{id}': {exceeded}, in its line of the journal"));
+        }
         self.events.accepted(&id, source, command, moment);
         self.admit(&id, command, moment);
         Ok(id)

@@ -104,7 +104,16 @@ impl Since {
             let read = std::io::Read::take(&mut journal, most).read_until(b'\n', &mut line)?;
             number += 1;
             let wrong = |message: String| SinceError::Line { line: number, message };
-            DOCUMENT.check(read).map_err(|exceeded| wrong(exceeded.to_string()))?;
+            if let Err(exceeded) = DOCUMENT.check(read) {
+                if reader.is_among_them {
+                    return Err(wrong(exceeded.to_string()));
+                }
+                // What other runs left in the file is none of this one's trouble.
+                if line.last() != Some(&b'\n') {
+                    journal.skip_until(b'\n')?;
+                }
+                continue;
+            }
             if read == 0 || line.last() != Some(&b'\n') {
                 break;
             }
@@ -325,6 +334,8 @@ impl Reader {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read as _;
+
     use super::*;
 
     const JOURNAL: &str = r#"{"run":{"id":"r1","version":"0","began":0,"deform":{},"guard":{},"schedule":{"steps":1}}}
@@ -401,6 +412,24 @@ mod tests {
         let error = read(&broken, "r1").unwrap_err();
         assert!(error.to_string().starts_with("line 9: "), "{error}");
     }
+
+    /// Lines of other runs are passed over, however long they are; one of this run is named.
+    #[test]
+    fn a_line_that_is_too_long_matters_in_its_own_run_alone() {
+        let from = RestartedFrom { run: "r1".into(), checkpoint: "k".into(), cycle: 2 };
+        let after = |begin: &'static [u8], end: &'static [u8]| {
+            let long = std::io::repeat(b'x').take(DOCUMENT.most as u64);
+            Since::read(std::io::BufReader::new(begin.chain(long).chain(end)), &from)
+        };
+        let other = JOURNAL.lines().next().unwrap().replace("r1", "r0") + "\n\"";
+        let end = format!("\"\n{JOURNAL}");
+        let since = after(other.leak().as_bytes(), end.leak().as_bytes()).unwrap();
+        assert_eq!(since, read(JOURNAL, "r1").unwrap());
+        let own = JOURNAL.lines().next().unwrap().to_owned() + "\n\"";
+        let error = after(own.leak().as_bytes(), b"\"\n").unwrap_err().to_string();
+        assert!(error.starts_with("line 2: "), "{error}");
+    }
+
     #[test]
     fn what_became_of_a_command_is_known_where_the_checkpoint_alone_has_it() {
         let lines = goes_on(

@@ -310,3 +310,20 @@ fn whoever_waits_for_a_line_may_be_the_last_to_hold_the_journal() {
         std::thread::sleep(Duration::from_millis(1));
     }
 }
+
+/// A run that goes on would stop at such a line.
+#[test]
+fn a_line_that_nobody_would_read_is_not_written() {
+    let desk = Desk::new();
+    let long = JournalEntry { reason: Some("x".repeat(DOCUMENT.most)), ..entry("a") };
+    assert_eq!(desk.journal.try_write(&long), Err(DOCUMENT.check(line(&long).len()).unwrap_err()));
+    desk.ask_for(&long);
+    let (id, outcome) = desk.outcome();
+    assert!(id == "a" && outcome.unwrap_err().contains("in its line of the journal"));
+    let many = JournalEntry { reason: Some("[".repeat(VALUES.most)), ..entry("b") };
+    assert!(desk.journal.try_write(&many).is_err());
+    assert_eq!(desk.journal.try_write(&entry("c")), Ok(()));
+    desk.disk.send(Ok(())).unwrap();
+    desk.journal.wait();
+    assert_eq!(lock(&desk.written).matches("\"id\"").count(), 1);
+}
