@@ -118,9 +118,19 @@ impl Link {
         self.host.trim_start_matches('[').trim_end_matches(']')
     }
 
-    /// The path of a request, with the token.
-    pub(crate) fn path(&self, of: &str) -> String {
-        format!("{}/{of}?token={}", self.prefix, self.token)
+    /// The path of the page, with the token.
+    fn page(&self) -> String {
+        format!("{}/?token={}", self.prefix, self.token)
+    }
+
+    /// The path of a request. It has no token, for whoever stands between writes paths down: the header
+    /// `Authorization` has it.
+    pub(crate) fn path(&self, of: &str, query: &[(&str, &str)]) -> String {
+        let mut path = format!("{}/{of}", self.prefix);
+        for (index, (key, value)) in query.iter().enumerate() {
+            path += &format!("{}{key}={value}", if index == 0 { '?' } else { '&' });
+        }
+        path
     }
 
     /// The address of the viewer's page with a path behind it, such as `?key=...`.
@@ -143,17 +153,14 @@ impl Link {
         back: Option<&str>,
         looks: bool,
     ) -> String {
-        let mut client = client.map_or_else(String::new, |name| format!("&client={name}"));
-        if let Some(role) = role {
-            client += &format!("&role={role}");
-        }
-        if let Some(back) = back {
-            client += &format!("&back={back}");
-        }
+        let known = [("client", client), ("role", role), ("back", back)];
+        let mut query: Vec<_> = (known.into_iter())
+            .filter_map(|(key, value)| value.map(|value| (key, value)))
+            .collect();
         if !looks {
-            client += "&views=none";
+            query.push(("views", "none"));
         }
-        format!("ws://{}{}{client}", self.authority(), self.path("ws"))
+        format!("ws://{}{}", self.authority(), self.path("ws", &query))
     }
 }
 
@@ -239,9 +246,9 @@ impl FromStr for Link {
 impl fmt::Display for Link {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.way {
-            Way::Plain => write!(f, "http://{}{}", self.authority(), self.path("")),
+            Way::Plain => write!(f, "http://{}{}", self.authority(), self.page()),
             Way::Encrypted(pinned) => {
-                write!(f, "https://{}{}", self.authority(), self.path(""))?;
+                write!(f, "https://{}{}", self.authority(), self.page())?;
                 pinned.iter().try_for_each(|fingerprint| write!(f, "#sha256={fingerprint}"))
             }
             Way::Socket(path) => write!(f, "unix:{}?token={}", path.display(), self.token),
@@ -266,15 +273,15 @@ mod tests {
         let link = read(" http://[::1]:7070/?token=abc\n").expect("a link");
         assert_eq!(
             (link.name(), &*link.socket(None, None, None, true)),
-            ("::1", "ws://[::1]:7070/ws?token=abc")
+            ("::1", "ws://[::1]:7070/ws")
         );
         assert_eq!(link.opened_by("?key=k"), "http://[::1]:7070/?key=k");
         let link = read("http://host/a/b/?x=1&token=t-1#page").expect("a link");
         assert_eq!(link.opened_by("?key=k"), "http://host/a/b/?key=k");
-        assert_eq!((link.port(), &*link.path("surface")), (80, "/a/b/surface?token=t-1"));
+        assert_eq!((link.port(), &*link.path("surface", &[])), (80, "/a/b/surface"));
         assert_eq!(
-            link.socket(None, Some("c3"), None, true),
-            "ws://host:80/a/b/ws?token=t-1&client=c3"
+            link.socket(Some("watch"), Some("c3"), None, false),
+            "ws://host:80/a/b/ws?client=c3&role=watch&views=none"
         );
         assert!(!format!("{link:?}").contains("t-1"));
         let digits = "0A".repeat(32);

@@ -88,12 +88,12 @@ pub(super) async fn is_encrypted(link: &Link) -> bool {
 pub(super) async fn get(
     link: &Link,
     path: &'static str,
-    query: &str,
+    query: &[(&str, &str)],
     most: usize,
 ) -> Result<Answer, ClientError> {
     let mut stream = open(link).await?;
     let not_tombolo = |found: String| not_tombolo(link, found);
-    let asked = link.path(path) + query;
+    let asked = link.path(path, query);
     let bytes = exchange(&mut *stream, link, &asked, HEAD.saturating_add(most)).await;
     let bytes = bytes.map_err(|error| not_tombolo(format!("no answer ({error})")))?;
     let mut headers = [httparse::EMPTY_HEADER; HEADERS];

@@ -408,7 +408,7 @@ impl Client {
     /// # Errors
     /// [`ClientError`] where the answer is none, or comes later than [`Options::answer`].
     pub fn pipelines(&self) -> Result<Value, ClientError> {
-        let body = self.get("pipelines", "", DOCUMENT.most)?;
+        let body = self.get("pipelines", &[], DOCUMENT.most)?;
         serde_json::from_slice(&body).map_err(|error| self.wrong(&error))
     }
 
@@ -426,8 +426,8 @@ impl Client {
         }
         let (mut revision, mut stack, mut bytes) = (None, Vec::new(), 0_usize);
         for _ in 0..EDITS.most {
-            let from = format!("&from={}", stack.len());
-            let body = self.get("stack", &from, 2 * DOCUMENT.most)?;
+            let from = stack.len().to_string();
+            let body = self.get("stack", &[("from", &from)], 2 * DOCUMENT.most)?;
             let answer: Answer =
                 serde_json::from_slice(&body).map_err(|error| self.wrong(&error))?;
             if revision.is_some_and(|revision| revision != answer.revision) {
@@ -457,7 +457,7 @@ impl Client {
     /// [`ClientError::Answer`] with the status 404 as long as there is no mesh whose shape could be
     /// changed; [`ClientError::NoAnswer`] after [`Options::answer`].
     pub fn surface(&self) -> Result<Surface, ClientError> {
-        let body = self.get("surface", "", SURFACE)?;
+        let body = self.get("surface", &[], SURFACE)?;
         decode_surface(&body).map_err(|error| self.wrong(&error))
     }
 
@@ -466,8 +466,13 @@ impl Client {
         get::not_tombolo(&self.link, get::shown(reason.to_string().as_bytes()))
     }
 
-    /// Asks for a path, with what comes behind the token in its query.
-    fn get(&self, path: &'static str, query: &str, most: usize) -> Result<Vec<u8>, ClientError> {
+    /// Asks for a path.
+    fn get(
+        &self,
+        path: &'static str,
+        query: &[(&str, &str)],
+        most: usize,
+    ) -> Result<Vec<u8>, ClientError> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
         let runtime = runtime.map_err(|error| ClientError::System { reason: error.to_string() })?;
         let asked = get::get(&self.link, path, query, most);
