@@ -93,3 +93,4 @@ pub use tombolo_deform::communicator;
 pub use tombolo_deform::mesh::{ArrayView, MeshView};
 pub use tombolo_pipelines as pipelines;
 pub use tombolo_pipelines::extract::{Association, Channel, FieldView};
+pub use watch::ConfigurationFile;

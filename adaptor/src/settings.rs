@@ -9,15 +9,13 @@ use tombolo_deform::{
     communicator::{Communicator, Solo},
     linear::{BuiltIn, Solvers},
 };
-use tombolo_pipelines::{
-    language::{self, Config, ReadError, Recording, TimedCommand},
-    limits::DOCUMENT,
-};
+use tombolo_pipelines::language::{self, Config, ReadError, Recording, TimedCommand};
 
 use crate::{
     checkpoint::{Checkpoint, Restart},
     condition::Condition,
     steering::Parameter,
+    watch::ConfigurationFile,
 };
 
 /// Everything that a run is set up with.
@@ -54,7 +52,7 @@ pub struct Settings {
     pub output: PathBuf,
     /// The file that the configuration was read from, where it was: with `"watch": true` the
     /// adaptor looks at it again while the run goes on.
-    pub file: Option<PathBuf>,
+    pub file: Option<ConfigurationFile>,
 }
 
 impl Settings {
@@ -64,10 +62,8 @@ impl Settings {
     /// # Errors
     /// [`ReadError`], which names the file, and the line and column of everything that is wrong.
     pub fn from_file(file: impl AsRef<Path>) -> Result<Self, ReadError> {
-        let file = file.as_ref();
-        let text = language::read_text(file, DOCUMENT)?;
-        let config = language::check(&text, &file.display().to_string())?;
-        Ok(Self { config, file: Some(file.into()), ..Self::default() })
+        let file = ConfigurationFile::read(file.as_ref())?;
+        Ok(Self { config: file.config().clone(), file: Some(file), ..Self::default() })
     }
 
     /// Lets a number of the solver be steered, from its value now to any in a range.

@@ -12,7 +12,9 @@ use std::{
 
 use serde_json::{Value, json};
 use tombolo_pipelines::{
-    language::{self, Config, Pipeline, PipelineChange, check_parameters, locate, read_text},
+    language::{
+        self, Config, Pipeline, PipelineChange, ReadError, check_parameters, locate, read_text,
+    },
     limits::DOCUMENT,
 };
 
@@ -22,6 +24,38 @@ use crate::{changes::Changes, steering::Source, stream::Hub};
 /// long, so that none is read half written.
 const PERIOD: Duration = Duration::from_secs(1);
 
+/// A configuration and the file that it was read from, by which a run finds out what is changed in the
+/// file from then on.
+#[derive(Debug, Clone)]
+pub struct ConfigurationFile {
+    path: PathBuf,
+    stamp: Stamp,
+    config: Config,
+}
+
+impl ConfigurationFile {
+    /// Reads a file.
+    pub(crate) fn read(path: &Path) -> Result<Self, ReadError> {
+        // Before it is read: whoever writes it meanwhile is heard.
+        let stamp = Stamp::of(path);
+        let text = read_text(path, DOCUMENT)?;
+        let config = language::check(&text, &path.display().to_string())?;
+        Ok(Self { path: path.into(), stamp, config })
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The configuration that was read.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+}
+
 /// A thread that looks at a file; dropping it ends the thread.
 pub(crate) struct Watch {
     stop: Option<Sender<()>>,
@@ -29,17 +63,16 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Begins with the file as it is now.
+    /// Begins with the file as it was read for the run.
     pub(crate) fn start(
-        file: &Path,
+        file: &ConfigurationFile,
         parameters: Vec<String>,
         changes: Arc<Changes>,
         hub: Option<Arc<Hub>>,
     ) -> std::io::Result<Self> {
-        let file = absolute(file)?;
-        let stamp = Stamp::of(&file);
-        let known = parse(&file, &parameters).ok();
-        let watched = Watched { known, taken: None, seen: stamp, read: stamp };
+        let ConfigurationFile { path, stamp, config } = file.clone();
+        let file = absolute(path)?;
+        let watched = Watched { known: Some(config), taken: None, seen: stamp, read: stamp };
         let mut watcher = Watcher { file, parameters, changes, hub, watched };
         let (stop, stopped) = channel();
         let watching = move || {

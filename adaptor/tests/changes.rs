@@ -517,10 +517,21 @@ fn the_file_of_the_configuration_is_looked_at_again() {
     write(&file, text(&json!([health]), "a.jsonl")).expect("written");
     let mut settings = Adaptor::from_file(&file).expect("a configuration");
     settings.output = folder.path().into();
+    // Changed while the solver still reads its mesh.
+    let early = json!({"name": "early", "stages": [{"quality": {}}]});
+    write(&file, text(&json!([health, early]), "a.jsonl")).expect("written");
     let mut solver = Solver::new(settings);
     solver.step();
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
+    let told = solver.step_until_told(&mut viewer, "pipelines", |told| {
+        told["status"] == "applied" && told["added"] == json!(["early"])
+    });
+    assert_eq!(told["removed"], json!([]));
+    write(&file, text(&json!([health]), "a.jsonl")).expect("written");
+    solver.step_until_told(&mut viewer, "pipelines", |told| {
+        told["status"] == "applied" && told["removed"] == json!(["early"])
+    });
     viewer.send(&json!({"id": "own", "pipelines": {"set": [slice(0.5)]}}));
     applied(&mut solver, &mut viewer, "own");
 
@@ -569,7 +580,7 @@ fn the_file_of_the_configuration_is_looked_at_again() {
     let journal = read_to_string(folder.path().join("a.jsonl")).expect("a journal");
     let lines = statuses(&journal);
     let from_file = lines.iter().filter(|line| line["by"] == "configuration");
-    assert_eq!(from_file.count(), 3, "{journal}");
+    assert_eq!(from_file.count(), 5, "{journal}");
 }
 
 #[test]

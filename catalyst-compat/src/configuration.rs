@@ -4,9 +4,9 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use tombolo::Parameter;
 use tombolo::foreign::RunError;
 use tombolo::pipelines::language::{self, Config, Pipeline, Steering, StreamServer, TimedCommand};
+use tombolo::{ConfigurationFile, Parameter};
 
 use crate::node::{Kind, Node};
 use crate::results::RESERVED;
@@ -37,7 +37,7 @@ pub(crate) struct Configuration {
     pub(crate) orders: Vec<TimedCommand>,
     pub(crate) output: PathBuf,
     /// The file that is watched.
-    pub(crate) file: Option<PathBuf>,
+    pub(crate) file: Option<ConfigurationFile>,
     /// The checkpoint that the run goes on from.
     pub(crate) restart: Option<String>,
     /// Requests that are not carried out, for the log.
@@ -158,7 +158,7 @@ fn default_config(channels: &[String]) -> Result<Config, RunError> {
 fn merged(
     found: &mut Found,
     of_user: Option<&str>,
-) -> Result<(Config, Groups, Option<PathBuf>), RunError> {
+) -> Result<(Config, Groups, Option<ConfigurationFile>), RunError> {
     let own = json!({"version": 1, "pipelines": found.pipelines});
     let mut config = language::check(&own.to_string(), "catalyst/pipelines")?;
     let mut groups: Groups = found.others.iter().map(|name| (name.clone(), Vec::new())).collect();
@@ -196,7 +196,7 @@ fn merged(
             groups.push((name.clone(), vec![name]));
         }
     }
-    Ok((config, groups, settings.watch.map(PathBuf::from)))
+    Ok((config, groups, settings.watch))
 }
 
 /// Settings that a run has once, each with the file that says it: the first that does.
@@ -208,7 +208,7 @@ struct Settings {
     record: Option<((String, NonZeroU32), String)>,
     steering: Option<(Steering, String)>,
     /// The file that is watched.
-    watch: Option<String>,
+    watch: Option<ConfigurationFile>,
 }
 
 impl Settings {
@@ -231,7 +231,7 @@ impl Settings {
                 _ => {}
             }
         }
-        let config = tombolo::Settings::from_file(file)?.config;
+        let tombolo::Settings { config, file: read, .. } = tombolo::Settings::from_file(file)?;
         // What a file does not say is what it would be by itself.
         let steering = Some(config.steering).filter(|steering| *steering != Steering::default());
         first(&mut self.stream, config.stream, "stream", file, notes);
@@ -241,8 +241,9 @@ impl Settings {
         first(&mut self.steering, steering, "steering", file, notes);
         if config.watch {
             match &self.watch {
-                None => self.watch = Some(file.to_owned()),
+                None => self.watch = read,
                 Some(before) => {
+                    let before = before.path().display();
                     notes.push(format!("'watch' of {file} is passed over: {before} is watched"));
                 }
             }
@@ -474,7 +475,7 @@ mod tests {
                 format!("'watch' of {three} is passed over: {two} is watched"),
             ]
         );
-        assert!(config.watch && watched.is_some_and(|file| file.ends_with("two.json")));
+        assert!(config.watch && watched.is_some_and(|file| file.path().ends_with("two.json")));
         // No solver chooses among what the user asks for.
         let known: Vec<&str> = groups.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(known, ["a", "b", "io", "one", "two"]);

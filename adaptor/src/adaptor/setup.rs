@@ -133,7 +133,7 @@ impl Adaptor {
             Arc::clone(&clock),
         ));
         if let (Some(stream), Some(file), true) = (&config.stream, &file, first) {
-            warn_of_readable_token(&run, stream, file);
+            warn_of_readable_token(&run, stream, file.path());
         }
         let forecaster = Arc::default();
         let server = match (&config.stream, &hub) {
@@ -162,10 +162,11 @@ impl Adaptor {
         };
         let met = continued.as_ref().and_then(|continued| continued.checkpoint.run.met);
         let watch = match file {
-            Some(file) if config.watch && first && !is_replay => Some(
-                Watch::start(&file, known, Arc::clone(&changes), hub.clone())
-                    .map_err(|source| InitializeError::Watch { file, source })?,
-            ),
+            Some(file) if config.watch && first && !is_replay => {
+                Some(Watch::start(&file, known, Arc::clone(&changes), hub.clone()).map_err(
+                    |source| InitializeError::Watch { file: file.path().into(), source },
+                )?)
+            }
             None if config.watch => {
                 let message = "the configuration did not come from a file that could be watched";
                 return Err(InitializeError::Configuration(
