@@ -1,7 +1,7 @@
 //! The flow step by step, as a table.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use tombolo_pipelines::files::write_durably;
@@ -87,8 +87,9 @@ impl History {
         };
         let mut history = Self::create(file)?;
         let mut before = HEADER.to_owned() + "\n";
-        let whole = text.split_inclusive('\n').skip(1).filter(|line| line.ends_with('\n'));
-        for line in whole {
+        let columns = HEADER.split(',').count();
+        let is_whole = |line: &&str| line.ends_with('\n') && line.split(',').count() == columns;
+        for line in text.split_inclusive('\n').skip(1).filter(is_whole) {
             let number = line.split(',').next().and_then(|number| number.parse::<u64>().ok());
             if number.is_some_and(|number| number <= cycle) {
                 before.push_str(line);
@@ -114,7 +115,7 @@ impl History {
         // At once: a run may be watched through it, may be ended by force, and goes on where a disk is
         // full.
         self.begin()
-            .and_then(|lines| lines.write_all(line.as_bytes()))
+            .and_then(|lines| write_row(lines, line.as_bytes()))
             .map_err(|error| (self.file.clone(), error))
     }
 
@@ -138,4 +139,12 @@ impl History {
         };
         Ok(self.lines.insert(lines))
     }
+}
+
+/// Writes a row whole or not at all: the next one would go on in the same line.
+fn write_row(lines: &mut File, row: &[u8]) -> io::Result<()> {
+    let end = lines.seek(SeekFrom::End(0))?;
+    lines.write_all(row).inspect_err(|_| {
+        let _ = lines.set_len(end);
+    })
 }

@@ -223,7 +223,9 @@ fn run(
     let is_first = ranks.rank() == 0;
     let threads = arguments.threads.or_else(|| (ranks.size() > 1).then(|| threads(&*ranks)));
     if let Some(threads) = threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        // A rank that goes on its own would leave the others waiting.
+        let started = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        agreed(&*ranks, started.map_err(Box::<dyn std::error::Error>::from))?;
     }
     let state = || arguments.out.clone().unwrap_or_default().join("flow.state");
     let options = Options {

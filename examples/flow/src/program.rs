@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tombolo::communicator::{Communicator, Solo};
-use tombolo::{Adaptor, FinalizeError, Restart, Settings, Step, Stopper};
+use tombolo::{Adaptor, ConfigurationFile, FinalizeError, Restart, Settings, Step, Stopper};
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::linear::{BuiltIn, Solvers};
 use tombolo_deform::mesh::{Mesh, NumberType, Vector};
@@ -98,6 +98,8 @@ pub struct Run {
 struct Read {
     case: Case,
     config: Config,
+    /// The file that the configuration was read from.
+    pipelines: Option<ConfigurationFile>,
     orders: Vec<TimedCommand>,
     replay: Option<Recording>,
     mesh: Mesh,
@@ -109,14 +111,14 @@ struct Read {
 impl Read {
     fn new(options: &Options, rank: usize) -> Result<Self, ProgramError> {
         let case = Case::read(&options.case)?;
-        let config = config(options, &case)?;
+        let (config, pipelines) = config(options, &case)?;
         let orders = orders(options, &case)?;
         let replay = replay(options)?;
         let mesh = files::read_mesh(&case.mesh)?.mesh;
         let surface = Surface::extract(&mesh, &FeatureSettings::default())?;
         let patches = case.patches(&options.case, &surface)?;
         let state = options.restart.as_deref().map(|file| State::read(file, rank)).transpose()?;
-        Ok(Self { case, config, orders, replay, mesh, surface, patches, state })
+        Ok(Self { case, config, pipelines, orders, replay, mesh, surface, patches, state })
     }
 }
 
@@ -154,7 +156,7 @@ impl Run {
     ) -> Result<Self, ProgramError> {
         let is_first = communicator.rank() == 0;
         let read = agreed(&*communicator, Read::new(options, communicator.rank()))?;
-        let Read { case, config, orders, replay, mesh, surface, patches, state } = read;
+        let Read { case, config, pipelines, orders, replay, mesh, surface, patches, state } = read;
         let declared = case.declared_parameters();
         let mut parameters: Vec<f64> = declared.iter().map(|parameter| parameter.value).collect();
         let role = |patch: &Patch| (patch.name.clone(), patch.role(mesh.points(), &parameters));
@@ -177,6 +179,10 @@ impl Run {
             None => History::create(file),
         });
         let history = agreed(&*communicator, history.transpose().map_err(unwritten))?;
+        if let Some(out) = &options.out {
+            let made = if is_first { std::fs::create_dir_all(out) } else { Ok(()) };
+            agreed(&*communicator, made.map_err(|source| unwritten((out.clone(), source))))?;
+        }
         if let Some((file, _)) = &options.checkpoint {
             let made = if is_first { make_folder_of(file) } else { Ok(()) };
             agreed(&*communicator, made.map_err(|source| unwritten((file.clone(), source))))?;
@@ -191,7 +197,7 @@ impl Run {
             replay,
             restart,
             output: options.out.clone().unwrap_or_else(|| PathBuf::from(".")),
-            file: options.pipelines.clone().or(case.pipelines.clone()),
+            file: pipelines,
         })?;
         let points = solver.points();
         // With viewers a run goes on until somebody stops it, unless it was told when to end.
@@ -262,9 +268,11 @@ impl Run {
         let adaptor = match self.adaptor.finalize() {
             Ok(report) => report,
             Err(FinalizeError::Files { report, first, count }) => {
-                tell(format_args!(
+                let text = format!(
                     "{count} file(s) of the pipelines could not be written; the first: {first}"
-                ));
+                );
+                tell(format_args!("{text}"));
+                self.unwritten.told.push(text);
                 *report
             }
             Err(error) => return Err(error.into()),
@@ -431,11 +439,15 @@ fn unwritten((file, source): (PathBuf, std::io::Error)) -> ProgramError {
     ProgramError::File { file, source }
 }
 
-fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
-    let mut config = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
-        None => Settings::default().config,
-        Some(file) => Settings::from_file(file)?.config,
+fn config(
+    options: &Options,
+    case: &Case,
+) -> Result<(Config, Option<ConfigurationFile>), ProgramError> {
+    let settings = match options.pipelines.as_ref().or(case.pipelines.as_ref()) {
+        None => Settings::default(),
+        Some(file) => Settings::from_file(file)?,
     };
+    let mut config = settings.config;
     if options.headless {
         config.stream = None;
     } else {
@@ -444,7 +456,7 @@ fn config(options: &Options, case: &Case) -> Result<Config, ProgramError> {
             server.listen.clone_from(&options.listen);
         }
     }
-    Ok(config)
+    Ok((config, settings.file))
 }
 
 fn orders(options: &Options, case: &Case) -> Result<Vec<TimedCommand>, ProgramError> {

@@ -493,9 +493,9 @@ fn a_history_goes_on_where_the_run_does() {
         ..headless(&case)
     };
     run(&saving);
-    // A line of a step behind the state, and one that was being written.
+    // A line that a full disk cut, one of a step behind the state, and one that was being written.
     let table = std::fs::read_to_string(at("history.csv")).unwrap();
-    std::fs::write(at("history.csv"), format!("{table}8,0.4,0,0,0,99\n1")).unwrap();
+    std::fs::write(at("history.csv"), format!("{table}3,0.15\n8,0.4,0,0,0,99\n1")).unwrap();
     let torn = std::fs::read_to_string(at("history.csv")).unwrap();
     let further = Options { steps: Some(12), restart: Some(at("flow.state")), ..saving.clone() };
     drop(Run::new(&further).unwrap());
