@@ -63,30 +63,23 @@ pub(super) enum KeptSecret {
 impl KeptSecret {
     /// The secret in a file that nobody but its owner can read; the message says why there is none.
     pub(super) fn kept(self, path: &Path) -> Result<Secret, String> {
-        let failed = |error: std::io::Error| error.to_string();
-        match private().create_new(true).open(path) {
-            Ok(mut file) => {
-                let secret = Secret::random().map_err(|error| error.to_string())?;
-                let text = Some(secret.as_str().to_owned());
-                let kept = match self {
-                    Self::Watch => SecretsFile { watch: text, ..SecretsFile::default() },
-                    Self::Relay => SecretsFile { relay: text, ..SecretsFile::default() },
-                };
-                serde_json::to_writer(&mut file, &kept).map_err(|error| error.to_string())?;
-                file.write_all(b"\n").map_err(failed)?;
-                Ok(secret)
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
-                let file = read(path).map_err(|error| error.to_string())?;
-                let (name, text) = match self {
-                    Self::Watch => ("watch", file.watch),
-                    Self::Relay => ("relay", file.relay),
-                };
-                let text = text.ok_or_else(|| format!("it holds no secret `{name}`"))?;
-                Secret::given(&text).ok_or_else(|| format!("{name}: {EXPECTED}"))
-            }
-            Err(error) => Err(failed(error)),
+        if !path.exists() {
+            let secret = Secret::random().map_err(|error| error.to_string())?;
+            let text = Some(secret.as_str().to_owned());
+            let kept = match self {
+                Self::Watch => SecretsFile { watch: text, ..SecretsFile::default() },
+                Self::Relay => SecretsFile { relay: text, ..SecretsFile::default() },
+            };
+            let text = serde_json::to_string(&kept).map_err(|error| error.to_string())? + "\n";
+            create_private(path, text.as_bytes()).map_err(|error| error.to_string())?;
         }
+        let file = read(path).map_err(|error| error.to_string())?;
+        let (name, text) = match self {
+            Self::Watch => ("watch", file.watch),
+            Self::Relay => ("relay", file.relay),
+        };
+        let text = text.ok_or_else(|| format!("it holds no secret `{name}`"))?;
+        Secret::given(&text).ok_or_else(|| format!("{name}: {EXPECTED}"))
     }
 }
 
@@ -242,6 +235,19 @@ pub(super) fn private() -> OpenOptions {
     options
 }
 
+/// Makes a file that nobody but its owner can read, whole or not at all. Where somebody else makes it
+/// meanwhile, theirs stays.
+pub(super) fn create_private(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let mut file = tempfile::NamedTempFile::new_in(folder.unwrap_or(Path::new(".")))?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    match file.persist_noclobber(path) {
+        Err(error) if error.error.kind() != std::io::ErrorKind::AlreadyExists => Err(error.error),
+        _ => Ok(()),
+    }
+}
+
 /// Opens a file that holds a secret, which nobody but its owner may read; the message says why not.
 pub(super) fn open_private(path: &Path) -> Result<File, String> {
     let wrong = |reason: &str| format!("{}: {reason}", path.display());
@@ -340,6 +346,20 @@ mod tests {
             let both = [host, ("cookie", &*cookie), ("authorization", "Basic x")];
             assert_eq!(access(&credentials, "/ws", &both), None);
         }
+    }
+
+    #[test]
+    fn a_secret_is_made_once_and_whole() {
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("runs.json");
+        let made = KeptSecret::Relay.kept(&path).expect("made");
+        let again = KeptSecret::Relay.kept(&path).expect("read");
+        assert_eq!(made.as_str(), again.as_str());
+        // Another relay made one meanwhile.
+        create_private(&path, b"{}").expect("left as it is");
+        assert!(KeptSecret::Relay.kept(&path).is_ok());
+        let names: Vec<_> = std::fs::read_dir(directory.path()).expect("it").flatten().collect();
+        assert_eq!(names.len(), 1, "nothing is left beside it");
     }
 
     #[cfg(unix)]

@@ -48,7 +48,9 @@ pub(super) struct LinkFile {
 
 impl LinkFile {
     pub(super) fn write(path: PathBuf, text: &str) -> io::Result<Self> {
-        let held = write_whole(&path, text)?;
+        let named =
+            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
+        let held = write_whole(&path, text).map_err(named)?;
         Ok(Self { path, held })
     }
 
@@ -134,7 +136,10 @@ fn is_at(_: &File, _: &Path) -> bool {
 
 impl Drop for LinkFile {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
+        // Another run may have put its own file there: of another node, or with a port that was free.
+        if is_at(&self.held, &self.path) {
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 
@@ -359,6 +364,22 @@ mod tests {
         let expected = ["notes-2.link", "tombolo-1.link", "tombolo-3.txt", "tombolo-4.link"];
         assert_eq!(names[..4], expected);
         assert_eq!(names[4..], ["tombolo-5.link", "tombolo-6.link"]);
+    }
+
+    /// Two runs of different nodes may write at the same path of one file system.
+    #[test]
+    fn the_end_of_a_run_leaves_the_links_of_another() {
+        let directory = tempfile::tempdir().expect("a folder");
+        let path = directory.path().join("tombolo-7070.link");
+        let first = LinkFile::write(path.clone(), "first").expect("written");
+        let second = LinkFile::write(path.clone(), "second").expect("written");
+        drop(first);
+        assert_eq!(std::fs::read_to_string(&path).expect("it is there"), "second");
+        drop(second);
+        assert!(!path.exists());
+        let nowhere = directory.path().join("none/tombolo-7070.link");
+        let error = LinkFile::write(nowhere, "").err().expect("refused").to_string();
+        assert!(error.contains("none/tombolo-7070.link"), "{error}");
     }
 
     #[test]

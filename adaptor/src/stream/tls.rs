@@ -1,12 +1,7 @@
 //! How a server is known, where its connections are encrypted: by a certificate from files, or by one
 //! that is made for the run.
 
-use std::{
-    io::{Read, Write},
-    net::SocketAddr,
-    path::Path,
-    sync::Arc,
-};
+use std::{io::Read, net::SocketAddr, path::Path, sync::Arc};
 
 use rustls::{
     ServerConfig,
@@ -22,7 +17,7 @@ use tombolo_pipelines::language::{StreamServer, Tls};
 
 use super::{
     StreamError,
-    credentials::{open_private, private},
+    credentials::{create_private, open_private},
     socket::Place,
 };
 use crate::fingerprint::fingerprint;
@@ -69,11 +64,10 @@ impl Identity {
             let made = rcgen::generate_simple_self_signed(names)
                 .map_err(|error| StreamError::Tls(error.to_string()))?;
             let write = |path: &Path, bytes: &[u8]| {
-                let file = private().create(true).truncate(true).open(path);
-                let written = file.and_then(|mut file| file.write_all(bytes));
-                written.map_err(|error| wrong(path, &error.to_string()))
+                create_private(path, bytes).map_err(|error| wrong(path, &error.to_string()))
             };
-            // The key last: where it is there, the certificate is.
+            // The key last: where it is there, the certificate is. One without a key is of no use.
+            let _ = std::fs::remove_file(&certificate);
             write(&certificate, made.cert.der())?;
             write(&key, &made.signing_key.serialize_der())?;
         }
