@@ -76,7 +76,8 @@ pub(crate) fn read_of_ranks(
         return Ok(agree(communicator, Checkpoint::from_bytes(&bytes))?);
     }
     let error = |source| CheckpointError::File { file: file.into(), source };
-    let mut parts = File::open(file).map_err(error).map(|file| Parts { file });
+    let mut parts =
+        File::open(file).map_err(error).map(|file| Parts { file, read: 0, ranks: size });
     let mut fault = None;
     let mut next = || {
         let part = match &mut parts {
@@ -107,6 +108,10 @@ pub(crate) fn read_of_ranks(
 /// The checkpoints in a file.
 struct Parts {
     file: File,
+    /// How many have been read.
+    read: usize,
+    /// How many there should be.
+    ranks: usize,
 }
 
 enum PartError {
@@ -123,8 +128,16 @@ impl From<io::Error> for PartError {
 impl Parts {
     /// The bytes of the next; no more than the file has.
     fn next(&mut self) -> Result<Vec<u8>, PartError> {
-        let mut bytes = vec![0; HEAD];
-        self.file.read_exact(&mut bytes)?;
+        let mut bytes = Vec::new();
+        Read::by_ref(&mut self.file).take(HEAD as u64).read_to_end(&mut bytes)?;
+        if bytes.is_empty() && self.read > 0 {
+            let (found, expected) = (self.read, self.ranks);
+            return Err(PartError::Head(CheckpointError::Ranks { found, expected }));
+        }
+        if bytes.len() < HEAD {
+            return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        }
+        self.read += 1;
         let length = length_of(&bytes).map_err(PartError::Head)?;
         Read::by_ref(&mut self.file).take(length.saturating_add(4)).read_to_end(&mut bytes)?;
         Ok(bytes)
@@ -160,6 +173,13 @@ mod tests {
                 threads::run(3, |ranks| read_of_ranks(&ranks, &torn).unwrap_err().to_string());
             assert!(errors.iter().all(|error| *error == errors[0]), "{errors:?}");
         }
+        let wrong_ranks = |ranks: usize| {
+            let told =
+                threads::run(ranks, |ranks| read_of_ranks(&ranks, &file).unwrap_err().to_string());
+            assert!(told.iter().all(|error| error.contains("made on 3 ranks")), "{told:?}");
+        };
+        wrong_ranks(1);
+        wrong_ranks(4);
         let nowhere = directory.path().join("none/of-three");
         let errors = threads::run(3, |ranks| {
             write_of_ranks(&ranks, &nowhere, &of(ranks.rank(), 3)).unwrap_err().to_string()

@@ -197,16 +197,21 @@ impl Checkpoint {
             found: bytes.len() as u64,
             expected: expected.saturating_add(HEAD as u64),
         };
-        if rest.len() as u64 != expected {
-            return Err(torn());
-        }
-        let (held, checksum) = rest.split_last_chunk().ok_or_else(torn)?;
+        let first = usize::try_from(expected).ok().and_then(|length| rest.get(..length));
+        let (held, checksum) = first.and_then(<[u8]>::split_last_chunk).ok_or_else(torn)?;
         if crc32fast::hash(held) != u32::from_le_bytes(*checksum) {
             return Err(CheckpointError::Damaged("its checksum is another".into()));
         }
         let mut reader = Reader::new(0, held);
-        let run = serde_json::from_slice(reader.bytes()?)
+        let run: SavedRun = serde_json::from_slice(reader.bytes()?)
             .map_err(|error| CheckpointError::Damaged(error.to_string()))?;
+        if rest.len() as u64 != expected {
+            // Those of other ranks follow.
+            return Err(match run.ranks {
+                found @ 2.. => CheckpointError::Ranks { found, expected: 1 },
+                _ => torn(),
+            });
+        }
         let pipelines = reader.bytes()?.to_vec();
         let has_points = reader.u8()? != 0;
         let points = has_points.then(|| SavedPoints::read(&mut reader)).transpose()?;
