@@ -59,6 +59,16 @@ fn check_points_at_what_is_wrong() {
     assert_eq!(tombolo(directory.path(), &["check", "good.json"]).status.code(), Some(0));
     let missing = tombolo(directory.path(), &["check", "missing.json"]);
     assert!(missing.status.code() == Some(1) && error_text(&missing).contains("missing.json"));
+    let lists_one = |arguments: &[&str], said: &str| {
+        let output = tombolo(directory.path(), &[&["check", "--json"], arguments].concat());
+        let (errors, code) = (json(&output), output.status.code());
+        assert_eq!((errors.as_array().map(Vec::len), code), (Some(1), Some(1)), "{errors}");
+        assert!(errors[0]["message"].as_str().is_some_and(|it| it.contains(said)), "{errors}");
+    };
+    std::fs::write(directory.path().join("binary.json"), b"\xff").unwrap();
+    lists_one(&["missing.json"], "missing.json");
+    lists_one(&["binary.json"], "UTF-8");
+    lists_one(&["good.json", "--mesh", "none.vtu"], "none.vtu");
     assert!(json(&tombolo(directory.path(), &["schema"]))["properties"]["pipelines"].is_object());
 }
 

@@ -189,6 +189,21 @@ fn steer(link: &Link) {
 }
 
 #[test]
+fn a_public_address_that_no_link_can_have_is_refused() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let start = |public: &str| {
+        let listen = "127.0.0.1:0".parse().expect("an address");
+        let public = Some(public.to_owned());
+        Relay::start(&RelaySettings { listen, public, ..RelaySettings::new(directory.path()) })
+    };
+    for wrong in ["portal.example.org", "https://", "ftp://portal.example.org", "https://a b"] {
+        let error = start(wrong).err().expect("refused").to_string();
+        assert!(error.contains("public") && error.contains(wrong), "{error}");
+    }
+    assert!(start("https://portal.example.org/tombolo/").is_ok());
+}
+
+#[test]
 fn three_runs_are_listed_and_one_is_driven() {
     let here = Here::new(None);
     let address = here.relay.address();

@@ -7,7 +7,7 @@ use crate::{
     pipelines::{
         extract::{Association, Channel, Field, FieldView},
         files::read_mesh,
-        language::{Content, LanguageErrors, Trial, check_content, read_orders_text},
+        language::{Content, LanguageErrors, ReadError, Trial, check_content, read_orders_text},
         run::MeshTrial,
     },
 };
@@ -79,9 +79,29 @@ impl FromStr for Declared {
 
 pub(crate) fn check(options: &Options) -> Result<(), Failure> {
     let name = options.file.display().to_string();
-    let text = read_orders_text(&options.file)?;
-    let checked = match &options.mesh {
-        None => check_content(&text, &name, None),
+    match checked(options, &name) {
+        Ok(Ok(_)) if options.json => json(&[(); 0]),
+        Ok(Ok(content)) => say(format_args!("{name}: {}, all well", describe(&content))),
+        Ok(Err(errors)) => tell(&errors, options.json),
+        Err(Failure::Wrong(message)) if options.json => {
+            json(&[serde_json::json!({"file": name, "message": message})])?;
+            Err(Failure::Reported)
+        }
+        Err(failure) => Err(failure),
+    }
+}
+
+/// What a file says, or all that is wrong with it.
+///
+/// # Errors
+/// Where a file could not be read.
+fn checked(options: &Options, name: &str) -> Result<Result<Content, LanguageErrors>, Failure> {
+    let text = match read_orders_text(&options.file) {
+        Err(ReadError::Text(errors)) => return Ok(Err(errors)),
+        text => text?,
+    };
+    Ok(match &options.mesh {
+        None => check_content(&text, name, None),
         Some(mesh) => {
             let file = read_mesh(mesh)?;
             let surface = Arc::new(surface(&file.mesh, options.angle)?);
@@ -96,17 +116,9 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
                 trial = trial.of_channel(channel);
             }
             let trial: &mut dyn Trial = &mut trial;
-            check_content(&text, &name, Some(trial))
+            check_content(&text, name, Some(trial))
         }
-    };
-    match checked {
-        Ok(content) if options.json => {
-            drop(content);
-            json(&[(); 0])
-        }
-        Ok(content) => say(format_args!("{name}: {}, all well", describe(&content))),
-        Err(errors) => tell(&errors, options.json),
-    }
+    })
 }
 
 impl Declared {

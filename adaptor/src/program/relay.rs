@@ -8,7 +8,7 @@ use crate::{
 };
 use clap::Args;
 use signal_hook::{
-    consts::{SIGINT, SIGTERM},
+    consts::{SIGHUP, SIGINT, SIGTERM},
     iterator::Signals,
 };
 
@@ -59,7 +59,7 @@ pub(crate) fn relay(options: &Options) -> Result<(), Failure> {
         settings.connections = connections;
     }
     crate::logging::start();
-    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    let mut signals = Signals::new([SIGHUP, SIGINT, SIGTERM])?;
     let mut relay = Relay::start(&settings)?;
     say(&relay.invitation(std::io::stdout().is_terminal())?)?;
     signals.forever().next();

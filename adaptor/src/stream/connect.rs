@@ -322,7 +322,7 @@ fn certificate(relay: &RelayAddress) -> Option<Option<&str>> {
 }
 
 /// Whether a text can be the address of a run, with a slash at its end.
-fn is_address(text: &str) -> bool {
+pub(super) fn is_address(text: &str) -> bool {
     let is_plain = |c: char| c.is_ascii_graphic() && !"?#\"<>\\".contains(c);
     let rest = text.strip_prefix("https://").or_else(|| text.strip_prefix("http://"));
     text.len() <= ADDRESS

@@ -179,7 +179,7 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
     let mut bar = is_drawn.then(|| Bar::new(std::io::stderr()));
     // The run first takes the order, and then has it take the place of another.
     let mut is_placed = order.replaces.is_none();
-    let mut is_taken = false;
+    let (mut is_taken, mut was_lost) = (false, false);
     let begun = Instant::now();
     loop {
         // Other events do not extend the time that the order has to be placed.
@@ -203,9 +203,15 @@ fn give(client: &Client, order: &Order, wait: bool, as_json: bool) -> Result<(),
             // The connection was made again, and the run has the order.
             Event::Hello(hello) => match hello.orders.iter().find(|report| report.id == id) {
                 Some(report) => report,
+                None if is_taken && was_lost => {
+                    return Err(Failure::Wrong(format!(
+                        "the run there does not know the order {id}, which another run took"
+                    )));
+                }
                 None => continue,
             },
             Event::Lost { reason } => {
+                was_lost = true;
                 eprintln!(
                     "tombolo: connection lost ({reason}); it is made again, and the run keeps orders that it has taken"
                 );

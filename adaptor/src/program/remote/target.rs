@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, BufReader, ErrorKind, Read},
     path::{Path, PathBuf},
 };
 
@@ -75,7 +75,7 @@ fn read_link(text: &str) -> Result<Link, TargetError> {
         return Ok(text.parse()?);
     }
     let log = Path::new(text);
-    if !log.exists() {
+    if is_missing(log)? {
         return Err(match text.parse::<Link>() {
             Err(error) if is_address(text) => error.into(),
             _ => TargetError::Gone { path: log.into() },
@@ -89,7 +89,7 @@ fn read_link(text: &str) -> Result<Link, TargetError> {
         // As the run has told it, from where its output lies.
         Found::File(path) => log.parent().unwrap_or(Path::new("")).join(path),
     };
-    if !path.exists() {
+    if is_missing(&path)? {
         return Err(TargetError::Ended { log: log.into(), path });
     }
     let file = open(&path)?;
@@ -99,6 +99,20 @@ fn read_link(text: &str) -> Result<Link, TargetError> {
     match find(&path, file)? {
         Found::Link(link) => Ok(link),
         Found::File(_) => Err(TargetError::NoLink { path }),
+    }
+}
+
+/// Whether there is no such file. One in a folder that may not be entered is there for all that is
+/// known.
+fn is_missing(path: &Path) -> Result<bool, TargetError> {
+    let unreadable = |error: std::io::Error| TargetError::Unreadable {
+        path: path.into(),
+        reason: error.to_string(),
+    };
+    match std::fs::metadata(path) {
+        Ok(_) => Ok(false),
+        Err(error) if error.kind() == ErrorKind::PermissionDenied => Err(unreadable(error)),
+        Err(_) => Ok(true),
     }
 }
 

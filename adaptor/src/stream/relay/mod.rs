@@ -36,6 +36,7 @@ use tokio::sync::oneshot;
 use tombolo_pipelines::language::{Embedders, StreamLimits, Tls};
 
 use super::{
+    connect::is_address,
     connection::Connection,
     credentials::{Access, Credentials, KeptSecret},
     gate::{self, Gate},
@@ -108,6 +109,12 @@ pub enum RelayError {
         /// The reason.
         reason: String,
     },
+    /// Viewers could not be given links below its public address.
+    #[error("public: found {found:?}, expected https://HOST or http://HOST, with a path at will")]
+    Public {
+        /// The address.
+        found: String,
+    },
     /// Its secrets, its certificate or its threads are not to be had.
     #[error(transparent)]
     Stream(#[from] super::StreamError),
@@ -159,6 +166,10 @@ impl Relay {
     /// # Errors
     /// [`RelayError`].
     pub fn start(settings: &RelaySettings) -> Result<Self, RelayError> {
+        let public = settings.public.as_ref().map(|base| base.trim_end_matches('/').to_owned());
+        if public.as_ref().is_some_and(|base| !is_address(&format!("{base}/run/"))) {
+            return Err(RelayError::Public { found: settings.public.clone().unwrap_or_default() });
+        }
         let directory = &settings.directory;
         make_private(directory).map_err(|error| RelayError::Directory {
             path: directory.clone(),
@@ -191,7 +202,7 @@ impl Relay {
                 credentials: Arc::clone(&credentials),
                 refusals: Arc::clone(&refusals),
                 is_loopback: !is_open,
-                public: settings.public.as_deref().and_then(host_of).map(str::to_owned),
+                public: public.as_deref().and_then(host_of).map(str::to_owned),
                 is_encrypted: identity.is_some(),
                 // Of its own pages; those of a run have what the run says.
                 framing: gate::Framing::of(&Embedders::default()),
@@ -199,7 +210,7 @@ impl Relay {
             credentials,
             runs: Runs::new(settings.connections.get() as usize),
             fingerprint: identity.as_ref().map(|identity| identity.fingerprint.clone()),
-            public: settings.public.as_ref().map(|base| base.trim_end_matches('/').to_owned()),
+            public,
         });
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
