@@ -10,6 +10,8 @@ use tombolo_pipelines::{language::Existing, run::Table};
 /// A table that is open.
 pub(crate) struct OpenTable {
     file: File,
+    /// Whether the last row could not be written.
+    is_failing: bool,
 }
 
 /// Bytes of a first line that are looked at.
@@ -47,18 +49,19 @@ impl OpenTable {
                 if end > 0 && last != [b'\n'] {
                     file.write_all(b"\n").map_err(told)?;
                 }
-                return Ok(Self { file });
+                return Ok(Self { file, is_failing: false });
             }
         }
         let mut file = File::create(path).map_err(told)?;
         file.write_all(format!("{head}\n").as_bytes()).map_err(told)?;
-        Ok(Self { file })
+        Ok(Self { file, is_failing: false })
     }
 
-    /// Adds a row, which is in the file when this returns.
+    /// Adds a row, which is in the file when this returns, or nothing of it. The table goes on with the
+    /// next that can be written.
     ///
     /// # Errors
-    /// Why it cannot be written.
+    /// Why it cannot be written, told of the first of several in a row.
     pub(crate) fn push(&mut self, cycle: u64, time: f64, values: &[f64]) -> Result<(), String> {
         let mut row = format!("{cycle},{time}");
         for value in values {
@@ -68,9 +71,19 @@ impl OpenTable {
             };
         }
         row.push('\n');
+        let was_failing = std::mem::replace(&mut self.is_failing, false);
+        self.write(row.as_bytes()).or_else(|error| {
+            self.is_failing = true;
+            if was_failing { Ok(()) } else { Err(error.to_string()) }
+        })
+    }
+
+    fn write(&mut self, row: &[u8]) -> std::io::Result<()> {
+        let end = self.file.seek(SeekFrom::End(0))?;
         // In one piece, so that who reads meanwhile sees whole rows.
-        let written = self.file.write_all(row.as_bytes()).and_then(|()| self.file.flush());
-        written.map_err(|error| error.to_string())
+        self.file.write_all(row).and_then(|()| self.file.flush()).inspect_err(|_| {
+            let _ = self.file.set_len(end);
+        })
     }
 }
 
@@ -93,6 +106,23 @@ mod tests {
     fn table(existing: Existing) -> Table {
         let titles = vec!["drop [Pa]".into(), "a, b".into()];
         Table { file: "a.csv".into(), titles, existing }
+    }
+
+    /// `/dev/full` is the disk that has no room.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_table_goes_on_once_there_is_room() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        let mut open = OpenTable::open(&path, &table(Existing::Replace)).unwrap();
+        let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let file = std::mem::replace(&mut open.file, full);
+        assert!(open.push(1, 0.1, &[1.0, 2.0]).unwrap_err().contains("space"));
+        assert_eq!(open.push(2, 0.2, &[1.0, 2.0]), Ok(()), "told once");
+        open.file = file;
+        open.push(3, 0.3, &[1.0, 2.0]).unwrap();
+        let rows = read_to_string(&path).unwrap();
+        assert!(rows.ends_with("\"a, b\"\n3,0.3,1,2\n"), "{rows}");
     }
 
     #[test]

@@ -7,7 +7,8 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex,
-        mpsc::{Receiver, SendError, SyncSender, TrySendError, sync_channel},
+        atomic::{AtomicU64, Ordering},
+        mpsc::{Receiver, SyncSender, TrySendError, sync_channel},
     },
     thread::JoinHandle,
     time::{Duration, Instant},
@@ -28,6 +29,8 @@ pub(crate) use series::Membership;
 
 /// Files and rows that may wait to be written; the solver waits where the disk is slower than this.
 const WAITING: usize = 2;
+/// How long it waits for a disk that finishes no file meanwhile.
+const PATIENCE: Duration = Duration::from_secs(if cfg!(test) { 1 } else { 60 });
 /// Faults that are kept.
 const FAULTS: usize = 100;
 
@@ -62,6 +65,10 @@ pub(crate) struct Writer {
     tasks: Option<SyncSender<Task>>,
     thread: Option<JoinHandle<()>>,
     faults: Arc<Mutex<Vec<String>>>,
+    /// How many tasks the thread has come to the end of.
+    done: Arc<AtomicU64>,
+    /// How many it had when it was last waited for in vain.
+    hangs_at: Option<u64>,
     told: usize,
     since: Option<Moment>,
 }
@@ -76,9 +83,10 @@ impl Writer {
         if self.tasks.is_none() {
             let (tasks, next) = sync_channel(WAITING);
             let (faults, since) = (Arc::clone(&self.faults), self.since);
+            let done = Arc::clone(&self.done);
             let spawned = std::thread::Builder::new()
                 .name("tombolo-write".into())
-                .spawn(move || work(&next, &faults, since));
+                .spawn(move || work(&next, &faults, &done, since));
             match spawned {
                 Ok(thread) => (self.tasks, self.thread) = (Some(tasks), Some(thread)),
                 Err(error) => {
@@ -89,9 +97,23 @@ impl Writer {
                 }
             }
         }
-        let sent = self.tasks.as_ref().map(|tasks| tasks.send(Task::Write(job)));
-        if let Some(Err(SendError(Task::Write(job)))) = sent {
-            let path = job.path.display();
+        let Some(tasks) = &self.tasks else { return };
+        let path = job.path.clone();
+        let (done, was_hanging) = (&*self.done, self.hangs_at.take());
+        let mut sent = tasks.try_send(Task::Write(job));
+        let mut waiting = Waiting::new(done);
+        while let Err(TrySendError::Full(task)) = sent {
+            let hangs = was_hanging == Some(waiting.done()) || waiting.is_in_vain();
+            if hangs {
+                self.hangs_at = Some(waiting.done());
+                let path = path.display();
+                return note(&self.faults, format!("{path}: it was not written: {HANGS}"));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            sent = tasks.try_send(task);
+        }
+        if sent.is_err() {
+            let path = path.display();
             note(&self.faults, format!("{path}: the thread that writes has ended"));
         }
     }
@@ -125,13 +147,50 @@ impl Writer {
         new
     }
 
-    /// Waits until all is written; all faults.
+    /// Waits until all is written, unless the disk hangs; all faults.
     pub(crate) fn finish(&mut self) -> Vec<String> {
         self.tasks = None;
-        if self.thread.take().is_some_and(|thread| thread.join().is_err()) {
-            note(&self.faults, "the thread that writes files has failed".into());
+        if let Some(thread) = self.thread.take() {
+            let mut waiting = Waiting::new(&self.done);
+            while !thread.is_finished() && !waiting.is_in_vain() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            if !thread.is_finished() {
+                // It ends with the process.
+                note(&self.faults, format!("the last files were not written: {HANGS}"));
+            } else if thread.join().is_err() {
+                note(&self.faults, "the thread that writes files has failed".into());
+            }
         }
         lock(&self.faults).clone()
+    }
+}
+
+/// What is said of a disk that hangs.
+const HANGS: &str = "the disk has finished nothing for a minute";
+
+/// How long a thread has come to the end of nothing.
+struct Waiting<'a> {
+    done: &'a AtomicU64,
+    seen: u64,
+    since: Instant,
+}
+
+impl<'a> Waiting<'a> {
+    fn new(done: &'a AtomicU64) -> Self {
+        Self { done, seen: done.load(Ordering::Relaxed), since: Instant::now() }
+    }
+
+    fn done(&self) -> u64 {
+        self.done.load(Ordering::Relaxed)
+    }
+
+    /// Whether nothing has come to its end for [`PATIENCE`].
+    fn is_in_vain(&mut self) -> bool {
+        if self.done() != self.seen {
+            *self = Self::new(self.done);
+        }
+        self.since.elapsed() > PATIENCE
     }
 }
 
@@ -147,13 +206,18 @@ struct Written {
     series: AllSeries,
     /// Databases of pictures, by path.
     databases: HashMap<PathBuf, Database>,
-    /// By path; `None` where a table cannot be written, which has been told.
+    /// By path; `None` where a table cannot be begun, which has been told.
     tables: HashMap<PathBuf, Option<OpenTable>>,
     /// The cycle of the checkpoint that the run went on from.
     since: Option<u64>,
 }
 
-fn work(tasks: &Receiver<Task>, faults: &Mutex<Vec<String>>, since: Option<Moment>) {
+fn work(
+    tasks: &Receiver<Task>,
+    faults: &Mutex<Vec<String>>,
+    done: &AtomicU64,
+    since: Option<Moment>,
+) {
     let mut written = Written {
         series: AllSeries::new(since.map(|since| since.time)),
         databases: HashMap::new(),
@@ -178,6 +242,7 @@ fn work(tasks: &Receiver<Task>, faults: &Mutex<Vec<String>>, since: Option<Momen
         if let Err(fault) = outcome {
             note(faults, fault);
         }
+        done.fetch_add(1, Ordering::Relaxed);
     }
 }
 
@@ -211,11 +276,8 @@ impl Written {
                 open
             }
         };
-        let Some(opened) = open else { return Ok(()) };
-        opened.push(cycle, job.time, row).map_err(|fault| {
-            *open = None;
-            format!("{}: {fault}", job.path.display())
-        })
+        let Some(open) = open else { return Ok(()) };
+        open.push(cycle, job.time, row).map_err(|fault| format!("{}: {fault}", job.path.display()))
     }
 
     /// Writes a picture to its file, or adds it to its database. The first of a run begins the
@@ -238,3 +300,6 @@ impl Written {
         }
     }
 }
+
+#[cfg(all(test, unix))]
+mod tests;
