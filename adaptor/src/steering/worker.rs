@@ -117,6 +117,15 @@ pub(crate) struct Jobs {
     cancellation: Cancellation,
 }
 
+/// Another thread makes a plan until this is dropped.
+struct Elsewhere<'a>(&'a Jobs);
+
+impl Drop for Elsewhere<'_> {
+    fn drop(&mut self) {
+        self.0.change(|state| state.is_planned_elsewhere = false);
+    }
+}
+
 impl Jobs {
     fn change<T>(&self, change: impl FnOnce(&mut WaitingJobs) -> T) -> T {
         let changed = change(&mut lock(&self.state));
@@ -245,17 +254,14 @@ impl Jobs {
     }
 
     /// Makes way for a plan that another thread is about to make, as for one of the worker's own.
-    fn begin_elsewhere(&self, asked: &PlanRequest) {
+    fn begin_elsewhere(&self, asked: &PlanRequest) -> Elsewhere<'_> {
         self.change(|state| {
             state.is_planned_elsewhere = true;
             self.give_forecast_up(state, GivenUp::Delayed, |underway| {
                 underway.given_up.is_none() && !underway.asked.is(asked)
             });
         });
-    }
-
-    fn end_elsewhere(&self) {
-        self.change(|state| state.is_planned_elsewhere = false);
+        Elsewhere(self)
     }
 
     /// Lets a plan go on that another thread makes while this one has no plan under way: what was
@@ -396,14 +402,10 @@ impl Worker {
         planner: &Mutex<Planner>,
         asked: &PlanRequest,
     ) -> Result<Plan, Rejection> {
-        self.jobs.begin_elsewhere(asked);
-        let plan = {
-            let mut planner = lock(planner);
-            self.jobs.renew();
-            planner.plan(asked)
-        };
-        self.jobs.end_elsewhere();
-        plan
+        let _elsewhere = self.jobs.begin_elsewhere(asked);
+        let mut planner = lock(planner);
+        self.jobs.renew();
+        planner.plan(asked)
     }
 
     /// The next finished job, if there is one.

@@ -93,7 +93,7 @@ fn a_forecast_makes_way_for_a_plan_of_another_thread() {
     let (jobs, tell, told) = jobs();
     ask(&jobs, &tell, 1, "under way");
     let question = begin(&jobs);
-    jobs.begin_elsewhere(&other());
+    let elsewhere = jobs.begin_elsewhere(&other());
     assert!(jobs.cancellation.is_cancelled());
     end(&jobs, question);
     // It waits again; what is next meanwhile is something else.
@@ -101,7 +101,7 @@ fn a_forecast_makes_way_for_a_plan_of_another_thread() {
     assert!(matches!(jobs.next(), Some(Job::Ahead(_))));
     jobs.renew();
     assert!(!jobs.cancellation.is_cancelled());
-    jobs.end_elsewhere();
+    drop(elsewhere);
     end(&jobs, begin(&jobs));
     assert_eq!(told.try_iter().collect::<Vec<_>>(), [("under way", None)]);
 }
