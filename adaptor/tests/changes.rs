@@ -17,7 +17,7 @@ use tombolo::{
     Adaptor, Channel, FieldView, Settings, Step,
     deform::{
         communicator::{Communicator, threads},
-        distributed::Part,
+        distributed::{Part, in_order},
         shapes::box_of_tets,
     },
     pipelines::{
@@ -597,7 +597,6 @@ fn a_configuration_without_a_file_cannot_be_watched() {
 #[test]
 fn ranks_change_their_pipelines_at_the_same_cycle() {
     let mesh = box_of_tets([4, 3, 3], [0.0; 3], [1.0; 3]);
-    let count = mesh.cells().len();
     let (mut last, set) = (
         None,
         |field: &str| json!({"set": [{"name": "speed", "stages": [{"statistics": {"field": field}}]}, slice(0.4)]}),
@@ -605,7 +604,7 @@ fn ranks_change_their_pipelines_at_the_same_cycle() {
     for size in [1, 2, 3] {
         let outcomes = threads::run(size, |ranks| {
             let rank = ranks.rank();
-            let of_cells: Vec<usize> = (0..count).map(|cell| cell * size / count).collect();
+            let of_cells = in_order(mesh.cells().len(), size);
             let part = Part::cut(&mesh, &of_cells, rank, true).expect("a part");
             let ranks: Arc<dyn Communicator> = Arc::new(ranks);
             let mut adaptor = Settings { config: config(WATCHED_OVER), ..Settings::default() }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use tombolo::{
     Adaptor, MeshMotion, OrderReport, OrderStatus, Settings, Step,
     communicator::{Communicator, threads},
-    deform::distributed::Part,
+    deform::distributed::{Part, in_order},
     deform::{
         mesh::{ArrayView, Mesh, MeshView, Values, Vector},
         quality::quality,
@@ -318,8 +318,7 @@ fn the_surface_moves_and_the_volume_is_the_solvers() {
 }
 
 fn parts(mesh: &Mesh, rank: usize) -> Part {
-    let cells = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..cells).map(|cell| cell * 3 / cells).collect();
+    let of_cells = in_order(mesh.cells().len(), 3);
     Part::cut(mesh, &of_cells, rank, true).expect("a part")
 }
 

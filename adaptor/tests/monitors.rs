@@ -12,7 +12,7 @@ use tombolo::{
     Adaptor, Parameter, Settings, Step,
     deform::{
         communicator::{Communicator, threads},
-        distributed::Part,
+        distributed::{Part, in_order},
         shapes::box_of_tets,
     },
     pipelines::extract::Channel,
@@ -119,7 +119,7 @@ fn the_clock_of_rank_0_counts_for_all_ranks() {
         {"name": "slow", "every": {"seconds": 0.05}, "stages": [{"quality": {}}]}]}"#;
     let mesh = box_of_tets([3, 2, 2], [0.0; 3], [1.0; 3]);
     let count = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..count).map(|cell| cell * 3 / count).collect();
+    let of_cells = in_order(count, 3);
     let cycles = threads::run(3, |ranks| {
         let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
         let rank = ranks.rank();

@@ -12,7 +12,7 @@ use tombolo::{
     Adaptor, Channel, FieldView, Settings, Step,
     communicator::{Alarm, Communicator, Counted, Reduction, threads},
     deform::{
-        distributed::{Part, PartBoundary, domain},
+        distributed::{Part, PartBoundary, domain, in_order},
         features::FeatureSettings,
         mesh::{Mesh, Vector},
         shapes::box_of_tets,
@@ -183,8 +183,7 @@ fn stopped_while_planning(ranks: Arc<dyn Communicator>) {
         return;
     }
     let mesh = box_of_tets([20, 20, 40], [0.0; 3], [1.0, 1.0, 2.0]);
-    let of_cells: Vec<usize> =
-        (0..mesh.cells().len()).map(|cell| cell * size / mesh.cells().len()).collect();
+    let of_cells = in_order(mesh.cells().len(), size);
     let part = Part::cut(&mesh, &of_cells, rank, true).unwrap();
     let config = r#"{"version": 1, "pipelines": [{"name": "shape", "on": "order", "stages": [
         {"guard": {"min_scaled_jacobian": 0.05, "otherwise": "untangle", "surface": "allow"}}]}]}"#;
@@ -308,7 +307,7 @@ fn solved(
     let mesh = box_of_tets(cells, [0.0; 3], [1.0; 3]);
     // The last rank has no cells.
     let (count, parts) = (mesh.cells().len(), (ranks.size() - 1).max(1));
-    let of_cells: Vec<usize> = (0..count).map(|cell| cell * parts / count).collect();
+    let of_cells = in_order(count, parts);
     let part = Part::cut(&mesh, &of_cells, ranks.rank(), false).unwrap();
     let (domain, boundary) = domain(&ranks, &part, &FeatureSettings::default()).unwrap();
     let own = domain.mesh();
@@ -355,8 +354,7 @@ fn partitioned(ranks: Mpi) {
     let counted = Arc::new(Counted::new(ranks));
     let ranks: Arc<dyn Communicator> = counted.clone();
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
-    let of_cells: Vec<usize> =
-        (0..mesh.cells().len()).map(|cell| cell * ranks.size() / mesh.cells().len()).collect();
+    let of_cells = in_order(mesh.cells().len(), ranks.size());
     let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
     let (_, boundary) = PartBoundary::find(&ranks, &part, &FeatureSettings::default()).unwrap();
     if let Some(surface) = boundary.surface() {
@@ -371,8 +369,7 @@ fn partitioned(ranks: Mpi) {
 fn changed_pipelines(ranks: Arc<dyn Communicator>) {
     let mesh = box_of_tets([6, 5, 4], [0.0; 3], [1.0; 3]);
     let (rank, size) = (ranks.rank(), ranks.size());
-    let of_cells: Vec<usize> =
-        (0..mesh.cells().len()).map(|cell| cell * size / mesh.cells().len()).collect();
+    let of_cells = in_order(mesh.cells().len(), size);
     let part = Part::cut(&mesh, &of_cells, rank, true).unwrap();
     let heights: Vec<f64> = part.points.iter().map(|point| point[2]).collect();
     let of = |field: &str| {

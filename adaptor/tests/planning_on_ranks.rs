@@ -13,7 +13,10 @@ use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Settings, Step,
     communicator::{Communicator, threads},
-    deform::{distributed::Part, shapes::box_of_tets},
+    deform::{
+        distributed::{Part, in_order},
+        shapes::box_of_tets,
+    },
     pipelines::extract::Channel,
 };
 
@@ -32,8 +35,7 @@ type Outcome<T> = (u64, Vec<String>, Option<T>);
 /// Steps on all ranks until the viewer stops them, which says something from a thread of its own.
 fn run<T: Send>(say: impl Fn(&mut Viewer) -> T + Send + Sync) -> Vec<Outcome<T>> {
     let mesh = box_of_tets([24, 24, 24], [0.0; 3], [1.0; 3]);
-    let cells = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+    let of_cells = in_order(mesh.cells().len(), RANKS);
     let say = &say;
     threads::run(RANKS, |ranks| {
         let rank = ranks.rank();

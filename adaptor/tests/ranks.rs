@@ -11,7 +11,7 @@ use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
     Adaptor, Parameter, Settings, Step,
     communicator::{Communicator, Counted, threads},
-    deform::distributed::Part,
+    deform::distributed::{Part, in_order},
     deform::{
         mesh::{CellType, FeatureSource, Mesh},
         shapes::{BOX_FEATURES, box_of_tets},
@@ -26,8 +26,7 @@ use tombolo::{
 const RANKS: usize = 3;
 
 fn part(mesh: &Mesh, rank: usize) -> Part {
-    let cells = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+    let of_cells = in_order(mesh.cells().len(), RANKS);
     Part::cut(mesh, &of_cells, rank, true).expect("a part")
 }
 
@@ -551,7 +550,7 @@ fn orders_move_all_parts_at_the_same_cycle() {
         assert_eq!(points, part.points);
         (numbers, shapes, adaptor.finalize().expect("finalize").orders)
     };
-    let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).expect("a part");
+    let whole = Part::whole(&mesh).expect("a part");
     let (_, serial, told) = run(Arc::new(tombolo::communicator::Solo), &whole);
     assert_eq!(
         serial.len(),

@@ -10,7 +10,7 @@ use tombolo::{
     Adaptor, OrderReport, Settings, Step,
     communicator::{Communicator, threads},
     deform::{
-        distributed::Part,
+        distributed::{Part, in_order},
         mesh::{Mesh, Vector},
         shapes::box_of_tets,
     },
@@ -52,8 +52,8 @@ fn run(
 ) -> Vec<Ended> {
     let file = output.join("run.checkpoint");
     threads::run(ranks, |communicator| {
-        let (rank, cells) = (communicator.rank(), mesh.cells().len());
-        let of_cells: Vec<usize> = (0..cells).map(|cell| cell * ranks / cells).collect();
+        let rank = communicator.rank();
+        let of_cells = in_order(mesh.cells().len(), ranks);
         let mut part = Part::cut(mesh, &of_cells, rank, true).expect("a part");
         let settings =
             Settings { config: config(CONFIG), output: output.into(), ..Settings::default() };

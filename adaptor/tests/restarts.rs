@@ -13,7 +13,11 @@ use serde_json::{Value, json};
 use tombolo::{
     Adaptor, Channel, Checkpoint, OrderStatus, Settings, Step,
     communicator::{Communicator, threads},
-    deform::{distributed::Part, mesh::Mesh, shapes::box_of_tets},
+    deform::{
+        distributed::{Part, in_order},
+        mesh::Mesh,
+        shapes::box_of_tets,
+    },
     pipelines::language::{parse_journal, parse_orders},
 };
 
@@ -473,8 +477,7 @@ fn several_ranks_go_on_from_one_file() {
     let orders = parse_orders(ORDERS, "orders.json").unwrap();
     let run = |cycles: std::ops::Range<u64>, saved: Option<u64>, restarts: bool, start: &Mesh| {
         threads::run(RANKS, |ranks| {
-            let cells = mesh.cells().len();
-            let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+            let of_cells = in_order(mesh.cells().len(), RANKS);
             let mut part = Part::cut(start, &of_cells, ranks.rank(), true).unwrap();
             let text = format!(r#"{{"version": 1, {PIPELINES}}}"#);
             let settings =

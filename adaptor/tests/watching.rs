@@ -16,7 +16,10 @@ use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
     Settings, Step,
     communicator::{Communicator, threads},
-    deform::{distributed::Part, shapes::box_of_tets},
+    deform::{
+        distributed::{Part, in_order},
+        shapes::box_of_tets,
+    },
     pipelines::{
         encode::Decoder,
         extract::{Channel, FieldView},
@@ -304,8 +307,8 @@ fn views_rest_on_all_ranks_alike() {
     const RANKS: usize = 3;
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
     let runs = threads::run(RANKS, |ranks| {
-        let (rank, cells) = (ranks.rank(), mesh.cells().len());
-        let of_cells: Vec<usize> = (0..cells).map(|cell| cell * RANKS / cells).collect();
+        let rank = ranks.rank();
+        let of_cells = in_order(mesh.cells().len(), RANKS);
         let part = Part::cut(&mesh, &of_cells, rank, true).expect("a part");
         let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
         let mut adaptor = settings.on(Arc::new(ranks)).start().expect("initialize");

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
@@ -120,11 +120,11 @@ fn at(value: &Value, indices: [usize; 2]) -> f64 {
 
 fn agree(mesh: &Mesh, what: &str, pipelines: &str, compared: Compared) {
     let pipelines = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
-    let count = mesh.cells().len();
-    let whole = Part::cut(mesh, &vec![0; count], 0, false).unwrap();
+    let whole = Part::whole(mesh).unwrap();
     let mut extracts = made(&pipelines, &whole, Arc::new(Solo));
     // Cells in an order that leaves each rank several pieces, and copies of those of the others.
-    let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+    let of_cells: Vec<usize> =
+        in_order(mesh.cells().len(), 7).iter().map(|piece| piece % 3).collect();
     let by_ranks = threads::run(3, |ranks| {
         let part = Part::cut(mesh, &of_cells, ranks.rank(), true).unwrap();
         made(&pipelines, &part, Arc::new(ranks))

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::shapes::{box_of_tets, torus};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
@@ -45,7 +45,7 @@ fn left(
 }
 
 fn alone(stage: &str, mesh: &Mesh) -> (Arc<Extract>, Vec<f64>) {
-    let part = Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let part = Part::whole(mesh).unwrap();
     let (extract, monitors) = left(stage, &part, Arc::new(Solo));
     (extract.unwrap(), monitors)
 }
@@ -115,8 +115,7 @@ fn ranks_leave_what_one_process_leaves() {
     let mesh = box_of_tets([6, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
     let stage = r#"{"fraction": 0.2}"#;
     let (whole, monitors) = alone(stage, &mesh);
-    let count = mesh.cells().len();
-    let of_cells: Vec<usize> = (0..count).map(|cell| cell * 3 / count).collect();
+    let of_cells = in_order(mesh.cells().len(), 3);
     let by_ranks = threads::run(3, |ranks| {
         let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
         left(stage, &part, Arc::new(ranks))

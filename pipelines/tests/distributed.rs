@@ -133,7 +133,7 @@ fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
 #[test]
 fn extracts_are_those_of_one_process() {
     let mesh = box_of_tets([5, 4, 3], [0.0; 3], [2.0, 1.0, 1.0]);
-    let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let whole = Part::whole(&mesh).unwrap();
     let (serial, monitors) = made(&whole, Arc::new(Solo));
     for (ranks, empty, ghosts, shuffle) in
         [(2, None, false, 0), (3, Some(1), true, 0), (4, None, true, 9), (4, Some(0), false, 5)]

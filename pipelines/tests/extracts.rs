@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{
     ArrayView, CellType, Cells, FeatureSource, Mesh, MeshView, Values, Vector, ghosts,
 };
@@ -616,7 +616,7 @@ fn ranks_leave_out_the_ghosts_that_one_process_does() {
         let (serial, errors) = made(&whole, Arc::new(Solo));
         assert_eq!(errors, [""; 0], "{stages}");
         let outcomes = threads::run(3, |ranks| {
-            let of_cells: Vec<usize> = (0..count).map(|cell| cell * 3 / count).collect();
+            let of_cells = in_order(count, 3);
             let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
             let numbers = part.global_cells.clone().unwrap();
             let bits = part.ghosts.get_or_insert_with(|| vec![0; numbers.len()]);

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 use tombolo_deform::bounds::Bounds;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{CellType, Cells, Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells};
 use tombolo_deform::vector::{add, cross, length, subtract};
@@ -154,7 +154,7 @@ fn ranks_show_what_one_process_does() {
             Arc::new(Solo),
         );
         for (ranks, copies) in [(1, true), (2, true), (3, false), (4, true)] {
-            let of_cells: Vec<usize> = (0..count).map(|cell| cell * ranks / count).collect();
+            let of_cells = in_order(count, ranks);
             let mut outcomes = threads::run(ranks, |ranks| {
                 let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), copies).unwrap();
                 let numbers = part.global_cells.clone().unwrap();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{CellType, Mesh, Vector};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
@@ -34,7 +34,7 @@ fn mesh() -> Mesh {
 
 fn alone(stage: &str) -> Arc<Extract> {
     let mesh = mesh();
-    let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let part = Part::whole(&mesh).unwrap();
     glyphs(stage, &part, Arc::new(Solo)).unwrap()
 }
 
@@ -105,7 +105,7 @@ fn with_loads(extract: &Extract) -> Vec<[i64; 10]> {
 fn ranks_make_those_that_one_process_makes() {
     let mixed = mesh();
     let count = mixed.cells().len();
-    let in_turn = (0..count).map(|cell| cell * 7 / count % 3).collect();
+    let in_turn = in_order(count, 7).iter().map(|piece| piece % 3).collect();
     // Vertices lie at equal distances from the middles of boxes, and the cells of a rank all about.
     let even = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
     let mut cases: Vec<(&Mesh, Vec<usize>)> = vec![(&mixed, in_turn)];
@@ -123,7 +123,7 @@ fn ranks_make_those_that_one_process_makes() {
             r#"{"field": "u", "count": 64}"#,
             r#"{"shape": "sphere", "grid": {"lower": [0, 0, 0], "upper": [1, 1, 1], "counts": [5, 4, 3]}}"#,
         ] {
-            let part = Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+            let part = Part::whole(mesh).unwrap();
             let whole = glyphs(stage, &part, Arc::new(Solo)).unwrap();
             let by_ranks = threads::run(3, |ranks| {
                 let part = Part::cut(mesh, &of_cells, ranks.rank(), true).unwrap();

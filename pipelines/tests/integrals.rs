@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets};
@@ -61,11 +61,6 @@ fn found(
     (values, messages)
 }
 
-/// The whole mesh on one process.
-fn whole(mesh: &Mesh) -> Part {
-    Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap()
-}
-
 /// The same on several ranks with and without copies of each other's cells and with an empty rank.
 fn on_ranks(
     mesh: &Mesh,
@@ -73,10 +68,10 @@ fn on_ranks(
     scalar: fn(Vector) -> f64,
     vector: fn(Vector) -> Vector,
 ) -> Vec<Found> {
-    let count = mesh.cells().len();
     let mut all = Vec::new();
     for (ranks, ghosts) in [(3, true), (3, false), (4, true)] {
-        let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+        let of_cells: Vec<usize> =
+            in_order(mesh.cells().len(), 7).iter().map(|piece| piece % 3).collect();
         all.extend(threads::run(ranks, |ranks| {
             let part = Part::cut(mesh, &of_cells, ranks.rank(), ghosts).unwrap();
             found(pipelines, &part, Arc::new(ranks), scalar, vector)
@@ -146,7 +141,7 @@ fn parts_by_a_linear_field_are_those_by_a_plane() {
     let tets = warped(&box_of_tets([5, 4, 4], [0.0; 3], UPPER));
     let mixed = box_of_mixed_cells([6, 4, 4], [0.0; 3], UPPER);
     for mesh in [&tets, &mixed] {
-        let one = found(pipelines, &whole(mesh), Arc::new(Solo), scalar, vector);
+        let one = found(pipelines, &Part::whole(mesh).unwrap(), Arc::new(Solo), scalar, vector);
         assert!(one.1.is_empty(), "{:?}", one.1);
         for (by_field, by_plane) in [("level", "plane"), ("above", "side")] {
             for (name, value) in one.0.iter().filter(|(name, _)| name.starts_with(by_field)) {
@@ -167,7 +162,7 @@ fn linear_fields_have_their_closed_forms() {
     let tets = warped(&box_of_tets([5, 4, 4], [0.0; 3], UPPER));
     let mixed = box_of_mixed_cells([6, 4, 4], [0.0; 3], UPPER);
     for mesh in [&tets, &mixed] {
-        let one = found(REGIONS, &whole(mesh), Arc::new(Solo), scalar, vector);
+        let one = found(REGIONS, &Part::whole(mesh).unwrap(), Arc::new(Solo), scalar, vector);
         assert!(one.1.is_empty(), "{:?}", one.1);
         for (name, expected) in [
             ("whole.size", 2.0),
@@ -199,7 +194,7 @@ fn integrals_are_those_of_vtk() {
     let vector = |[x, y, z]: Vector| [y * z - 0.3 * x, (2.0 * x).sin() + z, 0.5 * x * x - y];
     let mesh = warped(&box_of_tets([5, 4, 4], [0.0; 3], UPPER));
     let pipelines = format!("{REGIONS}, {BY_FIELDS}");
-    let one = found(&pipelines, &whole(&mesh), Arc::new(Solo), scalar, vector);
+    let one = found(&pipelines, &Part::whole(&mesh).unwrap(), Arc::new(Solo), scalar, vector);
     is_alike(&on_ranks(&mesh, &pipelines, scalar, vector), &one);
 
     let folder = tempfile::tempdir().unwrap();
@@ -264,7 +259,7 @@ fn features_of_a_surface_are_integrated_by_themselves() {
         r#"{{"name": "ends", "stages": [{{"surface": {{}}}}, {{"integrate":
             {{"name": "outlet", "features": ["{name}"], "field": "p", "vector": "u"}}}}]}}"#
     );
-    let one = found(&pipelines, &whole(&mesh), Arc::new(Solo), scalar, vector);
+    let one = found(&pipelines, &Part::whole(&mesh).unwrap(), Arc::new(Solo), scalar, vector);
     is_near(one.0["outlet.size"], 1.0, "size");
     is_near(one.0["outlet.mean"], 2.5, "mean");
     is_near(one.0["outlet.flow_rate"], 1.5, "flow rate");
@@ -273,7 +268,7 @@ fn features_of_a_surface_are_integrated_by_themselves() {
 
     let wrong = pipelines.replace(name.as_str(), &format!("{name}s"));
     let expected = format!("did you mean `{name}`?");
-    let alone = found(&wrong, &whole(&mesh), Arc::new(Solo), scalar, vector);
+    let alone = found(&wrong, &Part::whole(&mesh).unwrap(), Arc::new(Solo), scalar, vector);
     assert!(alone.1.len() == 1 && alone.1[0].ends_with(&expected), "{:?}", alone.1);
     let several = on_ranks(&mesh, &wrong, scalar, vector);
     assert_eq!(several.iter().filter(|found| !found.1.is_empty()).count(), 3, "rank 0 speaks");
@@ -301,7 +296,7 @@ fn hidden_cells_and_what_is_not_finite_do_not_count() {
     is_near(values["surface.flow_rate"], 4.5, "flow rate");
 
     let nan = |[x, y, z]: Vector| if x + y + z == 0.0 { f64::NAN } else { x };
-    let all = [found(REGIONS, &whole(&mesh), Arc::new(Solo), nan, |point| point)];
+    let all = [found(REGIONS, &Part::whole(&mesh).unwrap(), Arc::new(Solo), nan, |point| point)];
     for (values, _) in all.into_iter().chain(on_ranks(&mesh, REGIONS, nan, |point| point)) {
         assert!(values["whole.mean"].is_nan() && values["surface.mean"].is_nan());
         is_near(values["cut.mean"], values["cut.integral"] / values["cut.size"], "cut");

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{FeatureSource, Mesh, MeshView, Vector};
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets};
@@ -75,10 +75,10 @@ impl Case {
     /// On one process, after several ranks have made the same: with and without copies of each
     /// other's cells, and with an empty rank.
     fn everywhere(&self, mesh: &Mesh, pipelines: &str) -> Made {
-        let count = mesh.cells().len();
-        let whole = Part::cut(mesh, &vec![0; count], 0, false).unwrap();
+        let whole = Part::whole(mesh).unwrap();
         let one = self.made(pipelines, &whole, Arc::new(Solo));
-        let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+        let of_cells: Vec<usize> =
+            in_order(mesh.cells().len(), 7).iter().map(|piece| piece % 3).collect();
         for (ranks, ghosts) in [(3, true), (3, false), (4, true)] {
             let several = threads::run(ranks, |ranks| {
                 let part = Part::cut(mesh, &of_cells, ranks.rank(), ghosts).unwrap();
@@ -266,7 +266,7 @@ fn shear_is_that_of_couette_and_poiseuille() {
     let error = |cells: usize| {
         let mesh = plain(&box_of_tets([2, 2, cells], [0.0; 3], UPPER));
         let count = mesh.cells().len();
-        let whole = Part::cut(&mesh, &vec![0; count], 0, false).unwrap();
+        let whole = Part::whole(&mesh).unwrap();
         let made = poiseuille.made(&stages("0.25"), &whole, Arc::new(Solo));
         is_near(made.monitors["stress.mean.x"] * 2.0, 2.0 * made.monitors["bottom.x"], "both ways");
         (made.monitors["bottom.x"] - 4.0 * 0.25 * 2.0).abs() / 2.0
@@ -451,7 +451,7 @@ fn a_spectrum_finds_the_frequency_of_a_flow() {
     let uneven: &'static [f64] =
         Vec::leak(times.iter().map(|time| time + 0.004 * (9.0 * time).sin()).collect());
     let whole = box_of_tets([2, 1, 1], [0.0; 3], UPPER);
-    let part = Part::cut(&whole, &vec![0; whole.cells().len()], 0, false).unwrap();
+    let part = Part::whole(&whole).unwrap();
     let made = Case { times: uneven, ..case }.made(pipelines, &part, Arc::new(Solo));
     assert_eq!(made.messages.len(), 1, "once: {:?}", made.messages);
     assert!(made.messages[0].contains("the time steps vary"));

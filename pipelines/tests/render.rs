@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
@@ -62,14 +62,10 @@ fn made(pipelines: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Ma
     made
 }
 
-fn whole(mesh: &Mesh) -> Part {
-    Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap()
-}
-
 /// The picture `a.png` of a mesh by one process.
 fn picture(mesh: &Mesh, stages: &str) -> Arc<Picture> {
     let pipeline = format!(r#"{{"name": "a", "stages": [{stages}]}}"#);
-    let made = made(&pipeline, &whole(mesh), Arc::new(Solo));
+    let made = made(&pipeline, &Part::whole(mesh).unwrap(), Arc::new(Solo));
     assert!(made.errors.is_empty(), "{:?}", made.errors);
     Arc::clone(&made.pictures["a.png"])
 }
@@ -188,13 +184,13 @@ fn one_and_three_ranks_draw_the_same_bits() {
         (bent(&box_of_tets([5, 4, 4], [0.0; 3], [2.0, 1.0, 1.0])), 5_146_431_304_096_962_729),
         (box_of_mixed_cells([6, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]), 7_133_610_293_070_344_132),
     ] {
-        let alone = made(&scenes, &whole(&mesh), Arc::new(Solo));
+        let alone = made(&scenes, &Part::whole(&mesh).unwrap(), Arc::new(Solo));
         assert!(alone.errors.is_empty(), "{:?}", alone.errors);
         assert_eq!(alone.pictures.len(), 12);
         let pixels = alone.pictures.values().flat_map(|picture| &picture.image.pixels);
         assert_eq!(fnv(pixels.copied()), sum);
         let count = mesh.cells().len();
-        let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+        let of_cells: Vec<usize> = in_order(count, 7).iter().map(|piece| piece % 3).collect();
         let by_ranks = threads::run(3, |ranks| {
             let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
             // The ranks number their vertices and cells in other ways.
@@ -250,7 +246,7 @@ fn pixels_are_what_the_rays_of_vtk_meet() {
                 r#"{"clip": {"sphere": {"center": [1.1, 0.45, 0.5], "radius": 0.6}}}"#,
             ];
             for source in sources {
-                let made = made(&stages(source), &whole(mesh), Arc::new(Solo));
+                let made = made(&stages(source), &Part::whole(mesh).unwrap(), Arc::new(Solo));
                 let folder = tempfile::tempdir().unwrap();
                 let [mesh_file, picture_file] =
                     ["a.vtu", "a.png"].map(|name| folder.path().join(name));
@@ -294,7 +290,7 @@ fn a_field_that_is_not_there_is_named_and_nothing_is_drawn() {
     let failed = |render: &str| {
         let pipeline =
             format!(r#"{{"name": "a", "stages": [{{"render": {{"file": "a.png", {render}}}}}]}}"#);
-        let made = made(&pipeline, &whole(&mesh), Arc::new(Solo));
+        let made = made(&pipeline, &Part::whole(&mesh).unwrap(), Arc::new(Solo));
         assert!(made.pictures.is_empty());
         made.errors.join("\n")
     };
@@ -309,7 +305,7 @@ fn a_database_says_what_its_pictures_show() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
     let pipeline = r#"{"name": "a", "stages": [{"render": {"file": "run.cdb", "width": 40, "height": 30,
         "orbit": {"azimuths": 2, "elevations": [-10, 30]}, "cameras": [{"name": "front", "position": [9, 0, 0], "focal_point": [0, 0, 0]}]}}]}"#;
-    let made = made(pipeline, &whole(&mesh), Arc::new(Solo));
+    let made = made(pipeline, &Part::whole(&mesh).unwrap(), Arc::new(Solo));
     // All go to one database.
     assert_eq!(made.pictures.keys().collect::<Vec<_>>(), ["run.cdb"]);
     let folder = tempfile::tempdir().unwrap();

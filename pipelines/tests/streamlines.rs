@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
-use tombolo_deform::distributed::Part;
+use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
@@ -45,7 +45,7 @@ fn lines(
 }
 
 fn alone(stage: &str, mesh: &Mesh, field: impl Fn(Vector) -> Vector) -> Arc<Extract> {
-    let part = Part::cut(mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let part = Part::whole(mesh).unwrap();
     let (extract, errors) = lines(stage, &part, field, Arc::new(Solo));
     assert!(errors.is_empty(), "{errors:?}");
     extract.unwrap()
@@ -185,8 +185,8 @@ fn lines_go_on_from_rank_to_rank() {
             r#"{"field": "u", "grid": {"lower": [0.31, 0.22, 0.23], "upper": [1.7, 0.81, 0.84], "counts": [3, 3, 3]}, "direction": "backward"}"#.to_owned(),
             r#"{"field": "u", "features": {"names": ["x-min"], "count": 6}, "max_length": 0.7}"#.to_owned(),
         ];
-        let count = mesh.cells().len();
-        let of_cells: Vec<usize> = (0..count).map(|cell| cell * 7 / count % 3).collect();
+        let of_cells: Vec<usize> =
+            in_order(mesh.cells().len(), 7).iter().map(|piece| piece % 3).collect();
         for (stage, has_ghosts) in stages.iter().zip([true, false, true]) {
             let whole = alone(stage, &mesh, swirl);
             let by_ranks = threads::run(3, |ranks| {
@@ -214,7 +214,7 @@ fn lines_go_on_from_rank_to_rank() {
 #[test]
 fn seeds_lie_on_the_features_of_any_mesh() {
     let mesh = box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
-    let mut part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let mut part = Part::whole(&mesh).unwrap();
     let hidden = (0..mesh.cells().len()).map(|cell| if cell == 100 { ghosts::HIDDEN } else { 0 });
     part.ghosts = Some(hidden.collect());
     let stage = r#"{"field": "u", "features": {"names": ["x-min"], "count": 4}}"#;
@@ -237,7 +237,7 @@ fn seeds_lie_on_the_features_of_any_mesh() {
 #[test]
 fn what_cannot_be_followed_is_told() {
     let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
-    let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+    let part = Part::whole(&mesh).unwrap();
     let told = |stage: &str| lines(stage, &part, rotation, Arc::new(Solo)).1.join("\n");
     assert_eq!(
         told(r#"{"field": "u", "points": [[0.2, 0.2, 0.2], [3, 0, 0]]}"#),

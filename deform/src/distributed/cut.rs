@@ -7,17 +7,38 @@ use crate::mesh::{
 use super::Part;
 use crate::topology::{indices, marked, marks};
 
+/// The piece of each cell where cells are dealt out in the order of their numbers, to `pieces`
+/// pieces of nearly the same size.
+///
+/// ```
+/// use tombolo_deform::distributed::in_order;
+///
+/// assert_eq!(in_order(5, 2), [0, 0, 0, 1, 1]);
+/// ```
+#[must_use]
+pub fn in_order(cells: usize, pieces: usize) -> Vec<usize> {
+    (0..cells).map(|cell| cell * pieces / cells).collect()
+}
+
 impl Part {
+    /// The whole mesh as the part of one rank, with the numbers of its vertices and cells.
+    ///
+    /// # Errors
+    /// Those of [`Self::cut`].
+    pub fn whole(mesh: &Mesh) -> Result<Self, MeshError> {
+        Self::cut(mesh, &vec![0; mesh.cells().len()], 0, false)
+    }
+
     /// The part that `rank` has of a mesh whose cells are dealt out to the ranks `of_cells`, with
     /// the global numbers of its vertices and cells. With `ghosts` come copies of the other ranks'
     /// cells that touch its own by a vertex.
     ///
     /// ```
     /// use tombolo_deform::shapes::box_of_tets;
-    /// use tombolo_deform::distributed::Part;
+    /// use tombolo_deform::distributed::{Part, in_order};
     ///
     /// let mesh = box_of_tets([2, 1, 1], [0.0; 3], [2.0, 1.0, 1.0]);
-    /// let of_cells: Vec<usize> = (0..mesh.cells().len()).map(|cell| cell * 2 / mesh.cells().len()).collect();
+    /// let of_cells = in_order(mesh.cells().len(), 2);
     /// let part = Part::cut(&mesh, &of_cells, 1, false)?;
     /// assert_eq!((part.cells.len(), part.global_cells.as_deref().map(|cells| cells[0])), (mesh.cells().len() / 2, Some(6)));
     /// # Ok::<(), tombolo_deform::mesh::MeshError>(())

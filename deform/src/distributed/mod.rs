@@ -38,6 +38,7 @@ use crate::{
 
 pub use assembly::Root;
 pub use boundary::PartBoundary;
+pub use cut::in_order;
 pub use domain::domain;
 
 use crate::communicator::{Garbled, RankError};

@@ -6,7 +6,10 @@ use std::sync::Arc;
 use tombolo_deform::communicator::{Communicator, Halo, threads};
 use tombolo_deform::mesh::{FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes::{BOX_FEATURES, box_of_tets};
-use tombolo_deform::{distributed::Part, mesh::SharedVertices};
+use tombolo_deform::{
+    distributed::{Part, in_order},
+    mesh::SharedVertices,
+};
 use tombolo_flow::{Condition, Fluid, Motion, Patch, Settings, Solver, SolverError, Value};
 
 const WATERY: Fluid = Fluid { density: 1.0, viscosity: 0.01 };
@@ -607,8 +610,7 @@ fn ranks_solve_the_same_equations() {
         };
         points.iter().map(squeezed).collect()
     };
-    let of_cells: Vec<usize> =
-        (0..mesh.cells().len()).map(|cell| cell * 3 / mesh.cells().len()).collect();
+    let of_cells = in_order(mesh.cells().len(), 3);
     for is_open in [true, false] {
         let conditions = || if is_open { open() } else { closed() };
         let advance = |solver: &mut Solver, points: &[Vector]| {

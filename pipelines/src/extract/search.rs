@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn a_mesh_at_rest_keeps_its_tree() {
         let mesh = box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
-        let mut part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let mut part = Part::whole(&mesh).unwrap();
         let stage = r#"{"field": "u", "points": [[0.2, 0.4, 0.6]]}"#;
         let lines: Streamlines = serde_json::from_str(stage).unwrap();
         let arrows: Glyphs = serde_json::from_str(stage).unwrap();

@@ -528,7 +528,7 @@ mod tests {
     #[test]
     fn lines_end_where_the_field_does() {
         let mesh = box_of_tets([8, 4, 4], [0.0; 3], [2.0, 1.0, 1.0]);
-        let part = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let part = Part::whole(&mesh).unwrap();
         let channel = Channel::new("fluid", part.view(), &[]);
         let mut source = Source::new(&channel).unwrap();
         let input = Input { channel: &channel, cycle: 0, wanted: &|_| false, communicator: &Solo };
@@ -561,7 +561,7 @@ mod tests {
     #[test]
     fn lines_of_too_many_points_are_refused() {
         let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
-        let whole = Part::cut(&mesh, &vec![0; mesh.cells().len()], 0, false).unwrap();
+        let whole = Part::whole(&mesh).unwrap();
         let all = turning(&whole, &Solo, 1 << 20).unwrap();
         assert_eq!(all, 8 * 301);
         assert_eq!(turning(&whole, &Solo, all).unwrap(), all);
