@@ -1,11 +1,14 @@
 //! What source stages take out of a mesh and derive from its fields, beside VTK's own filters, on
 //! one process and on three ranks.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use common::{runner, shown};
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
@@ -13,8 +16,7 @@ use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files;
-use tombolo_pipelines::language::parse;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 /// What is compared, beside what every comparison has: the values at common points.
 #[derive(Clone, Copy, PartialEq)]
@@ -90,10 +92,8 @@ fn made(
         FieldView::element("load", &load),
         FieldView::element("flux", &flux),
     ];
-    let shown = if part.points.is_empty() { &[] } else { &fields[..] };
-    let channels = [Channel::new("fluid", part.view(), shown)];
-    let config = parse(pipelines, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
+    let mut runner = runner(pipelines, communicator);
     let mut extracts = BTreeMap::new();
     // The second time from what was kept.
     for cycle in 0..2 {
@@ -119,15 +119,14 @@ fn at(value: &Value, indices: [usize; 2]) -> f64 {
 }
 
 fn agree(mesh: &Mesh, what: &str, pipelines: &str, compared: Compared) {
-    let pipelines = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
     let whole = Part::whole(mesh).unwrap();
-    let mut extracts = made(&pipelines, &whole, Arc::new(Solo));
+    let mut extracts = made(pipelines, &whole, Arc::new(Solo));
     // Cells in an order that leaves each rank several pieces, and copies of those of the others.
     let of_cells: Vec<usize> =
         in_order(mesh.cells().len(), 7).iter().map(|piece| piece % 3).collect();
     let by_ranks = threads::run(3, |ranks| {
         let part = Part::cut(mesh, &of_cells, ranks.rank(), true).unwrap();
-        made(&pipelines, &part, Arc::new(ranks))
+        made(pipelines, &part, Arc::new(ranks))
     });
     for (name, extract) in &by_ranks[0] {
         assert_eq!(extract.points.len(), extracts[name].points.len(), "{what}: {name}");
@@ -144,10 +143,11 @@ fn agree(mesh: &Mesh, what: &str, pipelines: &str, compared: Compared) {
         files::write(&path, extract).unwrap();
         path.display().to_string()
     };
-    let all = r#"{"version": 1, "pipelines": [{"name": "all", "stages": [{"write": {"file": "a.vtu"}}]}]}"#;
+    let all = r#"{"name": "all", "stages": [{"write": {"file": "a.vtu"}}]}"#;
     let input = written("the mesh", &made(all, &whole, Arc::new(Solo))["all"]);
     let file = folder.path().join("pipelines.json");
-    std::fs::write(&file, &pipelines).unwrap();
+    let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
+    std::fs::write(&file, text).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/vtk/extracts.py");
     let mut command = Command::new("/usr/bin/python3");
     command.arg(script).arg(&file).arg(input);

@@ -1,14 +1,16 @@
 //! Fewer triangles: how many, how far from the surface that they stand for, and what stays.
 
+mod common;
+
 use std::sync::Arc;
 
+use common::runner;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::shapes::{box_of_tets, torus};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
-use tombolo_pipelines::language::parse;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 /// What is left of the surface, and the monitors.
 fn left(
@@ -20,11 +22,10 @@ fn left(
     let load: Vec<f64> = (0..part.cells.len()).map(|cell| cell as f64).collect();
     let fields = [FieldView::vertex("x", &x), FieldView::element("load", &load)];
     let channels = [Channel::new("fluid", part.view(), &fields)];
-    let text = format!(
-        r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{{"surface": {{}}}}, {{"decimate": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}]}}"#
+    let pipeline = format!(
+        r#"{{"name": "a", "stages": [{{"surface": {{}}}}, {{"decimate": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}"#
     );
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let mut runner = runner(&pipeline, communicator);
     let (mut extract, mut monitors): (Option<Arc<Extract>>, _) = (None, Vec::new());
     // The second time from what was kept.
     for cycle in 0..2 {

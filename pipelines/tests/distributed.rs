@@ -1,10 +1,13 @@
 //! Pipelines over parts of meshes, against the same meshes on one process.
 
+mod common;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
 };
 
+use common::{cell_numbers, runner, shown};
 use tombolo_deform::{
     communicator::{Communicator, Solo, threads},
     distributed::Part,
@@ -41,7 +44,7 @@ fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usize> {
     (0..count).map(|cell| ranks[cell * ranks.len() / count]).collect()
 }
 
-const PIPELINES: &str = r#"{"version": 1, "pipelines": [
+const PIPELINES: &str = r#"
     {"name": "surface", "every": {"steps": 1}, "stages": [{"surface": {}}, {"stream": {}}]},
     {"name": "cut", "every": {"steps": 1}, "stages": [
         {"slice": {"origin": [1.05, 0.3, 0.4], "normal": [1, 0.2, 0.1]}}, {"quality": {}}, {"stream": {}}]},
@@ -54,7 +57,7 @@ const PIPELINES: &str = r#"{"version": 1, "pipelines": [
     {"name": "all", "every": {"steps": 1}, "stages": [{"write": {"file": "all-{cycle}.vtu"}}]},
     {"name": "health", "every": {"steps": 1}, "stages": [
         {"quality": {}}, {"statistics": {"field": "speed"}}, {"statistics": {"field": "load"}}],
-        "when": "quality.min < 2", "then": [{"pause": {}}]}]}"#;
+        "when": "quality.min < 2", "then": [{"pause": {}}]}"#;
 
 type Rounded = Vec<i64>;
 
@@ -96,19 +99,11 @@ type Made = (BTreeMap<String, Arc<Extract>>, Vec<(String, f64)>);
 /// What the pipelines make of a part.
 fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
     let speed: Vec<f64> = part.points.iter().map(|[x, y, z]| x + y * z).collect();
-    let number = |cell: usize| {
-        part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64)
-    };
-    // What stands in ghosts is nobody's business.
-    let load: Vec<f64> = (0..part.cells.len())
-        .map(|cell| if part.is_own(cell) { number(cell) } else { f64::NAN })
-        .collect();
+    let load = cell_numbers(part);
     let fields = [FieldView::vertex("speed", &speed), FieldView::element("load", &load)];
-    let shown = if part.points.is_empty() { &fields[..0] } else { &fields[..] };
-    let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown }];
-    let config = parse(PIPELINES, "test.json").unwrap();
+    let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown(part, &fields) }];
     let rank = communicator.rank();
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let mut runner = runner(PIPELINES, communicator);
     let (mut extracts, mut values, mut pauses) = (BTreeMap::new(), Vec::new(), 0);
     for cycle in 0..2 {
         for output in runner.run(&Snapshot { cycle, time: 0.0, channels: &channels }) {
@@ -179,7 +174,7 @@ fn a_field_that_is_wrong_on_one_rank_stops_nobody() {
         // Rank 1 lacks one field.
         let fields = [FieldView::vertex("speed", &speed), FieldView::vertex("other", &speed)];
         let shown = &fields[..if rank == 1 { 1 } else { 2 }];
-        let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown }];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown(part, &fields) }];
         let text = r#"{"version": 1, "pipelines": [{"name": "all", "every": {"steps": 1}, "stages": [
             {"surface": {}}, {"statistics": {"field": "other"}}, {"statistics": {"field": "speed"}}, {"stream": {}}]}]}"#;
         let mut runner =

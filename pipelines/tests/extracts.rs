@@ -1,7 +1,10 @@
 //! Source stages and derived fields: closed forms, invariants, what is kept, and what goes wrong.
 
+mod common;
+
 use std::sync::Arc;
 
+use common::hide;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{
@@ -10,14 +13,10 @@ use tombolo_deform::mesh::{
 use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells, box_of_tets, single_cell};
 use tombolo_deform::vector::{add, cross, dot, length, polygon_normal, scale, subtract};
 use tombolo_pipelines::extract::{Association, Channel, Extract, Field, FieldView, Snapshot};
-use tombolo_pipelines::language::parse;
 use tombolo_pipelines::run::{Output, Runner};
 
 fn runner(stages: &str, communicator: Arc<dyn Communicator>) -> Runner {
-    let text =
-        format!(r#"{{"version": 1, "pipelines": [{{"name": "view", "stages": [{stages}]}}]}}"#);
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    Runner::with_communicator(&config, communicator).unwrap()
+    common::runner(&format!(r#"{{"name": "view", "stages": [{stages}]}}"#), communicator)
 }
 
 /// The extract of a step, and what was told.
@@ -618,11 +617,7 @@ fn ranks_leave_out_the_ghosts_that_one_process_does() {
         let outcomes = threads::run(3, |ranks| {
             let of_cells = in_order(count, 3);
             let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
-            let numbers = part.global_cells.clone().unwrap();
-            let bits = part.ghosts.get_or_insert_with(|| vec![0; numbers.len()]);
-            bits.iter_mut()
-                .zip(numbers)
-                .for_each(|(bits, number)| *bits |= hidden[number as usize]);
+            hide(&mut part, &hidden);
             made(&part, Arc::new(ranks))
         });
         let (found, errors) = &outcomes[0];

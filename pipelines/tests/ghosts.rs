@@ -1,10 +1,13 @@
 //! Cells that are copies, hidden, or covered by finer ones, against what VTK draws of the same
 //! cells.
 
+mod common;
+
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use common::{hide, runner, shown};
 use proptest::prelude::*;
 use serde_json::Value;
 use tombolo_deform::bounds::Bounds;
@@ -15,18 +18,17 @@ use tombolo_deform::shapes::{box_of_hexahedra, box_of_mixed_cells};
 use tombolo_deform::vector::{add, cross, length, subtract};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files;
-use tombolo_pipelines::language::parse;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 /// The bits that cells may have: their own and their neighbours' connectivity, and the outside,
 /// change nothing.
 const BITS: [u8; 8] = [0, 0, ghosts::DUPLICATE, ghosts::REFINED, ghosts::HIDDEN, 33, 2 | 4, 16];
 
-const PIPELINES: &str = r#"{"version": 1, "pipelines": [
+const PIPELINES: &str = r#"
     {"name": "surface", "stages": [{"surface": {}}, {"stream": {}}]},
     {"name": "cut", "stages": [{"slice": {"origin": [1.05, 0.3, 0.45], "normal": [1, 0.2, 0.1]}}, {"stream": {}}]},
     {"name": "written", "stages": [{"select": {"fields": ["load"]}}, {"write": {"file": "all.vtu"}}]},
-    {"name": "health", "stages": [{"quality": {}}, {"statistics": {"field": "speed"}}, {"statistics": {"field": "load"}}]}]}"#;
+    {"name": "health", "stages": [{"quality": {}}, {"statistics": {"field": "speed"}}, {"statistics": {"field": "load"}}]}"#;
 
 /// What pipelines make of a part: the extracts of the first three, and the values of the last.
 #[derive(Debug, Default)]
@@ -42,10 +44,8 @@ fn made(part: &Part, communicator: Arc<dyn Communicator>) -> Made {
     };
     let load: Vec<f64> = (0..part.cells.len()).map(number).collect();
     let fields = [FieldView::vertex("speed", &speed), FieldView::element("load", &load)];
-    let channels =
-        [Channel::new("fluid", part.view(), if part.points.is_empty() { &[] } else { &fields })];
-    let mut runner =
-        Runner::with_communicator(&parse(PIPELINES, "test.json").unwrap(), communicator).unwrap();
+    let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
+    let mut runner = runner(PIPELINES, communicator);
     let mut made = Made::default();
     for output in runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels }) {
         match output {
@@ -157,11 +157,7 @@ fn ranks_show_what_one_process_does() {
             let of_cells = in_order(count, ranks);
             let mut outcomes = threads::run(ranks, |ranks| {
                 let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), copies).unwrap();
-                let numbers = part.global_cells.clone().unwrap();
-                let bits = part.ghosts.get_or_insert_with(|| vec![0; numbers.len()]);
-                bits.iter_mut()
-                    .zip(numbers)
-                    .for_each(|(bits, number)| *bits |= hidden[number as usize]);
+                hide(&mut part, &hidden);
                 made(&part, Arc::new(ranks))
             });
             let Made { extracts, values } = outcomes.swap_remove(0);

@@ -1,25 +1,26 @@
 //! Arrows and spheres: how many, how large, which way, and over the parts of a mesh.
 
+mod common;
+
 use std::sync::Arc;
 
+use common::runner;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{CellType, Mesh, Vector};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
-use tombolo_pipelines::language::parse;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 fn glyphs(stage: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Option<Arc<Extract>> {
     let u: Vec<Vector> = part.points.iter().map(|&[x, ..]| [0.0, 1.0 + x, 0.0]).collect();
     let load: Vec<f64> = part.global_cells.iter().flatten().map(|&cell| cell as f64).collect();
     let fields = [FieldView::vertex("u", &u), FieldView::element("load", &load)];
     let channels = [Channel::new("fluid", part.view(), &fields)];
-    let text = format!(
-        r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{{"glyphs": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}]}}"#
+    let pipeline = format!(
+        r#"{{"name": "a", "stages": [{{"glyphs": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}"#
     );
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let mut runner = runner(&pipeline, communicator);
     let outputs = runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels });
     let taken = outputs.into_iter().map(|output| match output {
         Output::Write { extract, .. } => extract,

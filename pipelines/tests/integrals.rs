@@ -1,10 +1,13 @@
 //! Integrals over extracts and whole meshes: closed forms, VTK's own, and several ranks.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use common::{cell_numbers, runner, shown};
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
@@ -31,21 +34,13 @@ fn found(
     scalar: fn(Vector) -> f64,
     vector: fn(Vector) -> Vector,
 ) -> Found {
-    let number = |cell: usize| {
-        part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64)
-    };
     let p: Vec<f64> = part.points.iter().map(|&point| scalar(point)).collect();
     let u: Vec<Vector> = part.points.iter().map(|&point| vector(point)).collect();
-    // What stands in ghosts is nobody's business.
-    let of_cell = |cell: usize| if part.is_own(cell) { number(cell) } else { f64::NAN };
-    let load: Vec<f64> = (0..part.cells.len()).map(of_cell).collect();
+    let load = cell_numbers(part);
     let fields =
         [FieldView::vertex("p", &p), FieldView::vertex("u", &u), FieldView::element("load", &load)];
-    let shown = if part.points.is_empty() { &[] } else { &fields[..] };
-    let channels = [Channel::new("fluid", part.view(), shown)];
-    let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
+    let mut runner = runner(pipelines, communicator);
     let (mut values, mut messages) = (BTreeMap::new(), Vec::new());
     for output in runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels }) {
         match output {

@@ -1,9 +1,12 @@
 //! Reductions beside integrals: histograms, forces, wall shear, differences, statistics over time and
 //! spectra; closed forms, on one process and on several ranks.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use common::{cell_numbers, runner, shown};
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::features::FeatureSettings;
@@ -39,14 +42,8 @@ impl Case {
     }
 
     fn made(&self, pipelines: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Made {
-        let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
-        let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-        let mut runner = Runner::with_communicator(&config, communicator).unwrap();
-        let number = |cell: usize| {
-            part.global_cells.as_ref().map_or(cell as f64, |numbers| numbers[cell] as f64)
-        };
-        let of_cell = |cell: usize| if part.is_own(cell) { number(cell) } else { f64::NAN };
-        let load: Vec<f64> = (0..part.cells.len()).map(of_cell).collect();
+        let mut runner = runner(pipelines, communicator);
+        let load = cell_numbers(part);
         let mut made = Made::default();
         for (cycle, &time) in (0..).zip(self.times) {
             let p: Vec<f64> = part.points.iter().map(|&point| (self.p)(point, time)).collect();
@@ -56,8 +53,7 @@ impl Case {
                 FieldView::vertex("u", &u),
                 FieldView::element("load", &load),
             ];
-            let shown = if part.points.is_empty() { &[] } else { &fields[..] };
-            let channels = [Channel::new("fluid", part.view(), shown)];
+            let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
             for output in runner.run(&Snapshot { cycle, time, channels: &channels }) {
                 match output {
                     Output::Monitor(monitor) => made.monitors.extend(monitor.values),

@@ -1,11 +1,14 @@
 //! Pictures: known pixels of known scenes, beside the rays of VTK, and the same bits on one process
 //! and on three ranks.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use common::{runner, shown};
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
@@ -13,9 +16,8 @@ use tombolo_deform::mesh::{Mesh, Vector, ghosts};
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files::{self, Database};
-use tombolo_pipelines::language::parse;
 use tombolo_pipelines::render::Picture;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 /// What pipelines make of a part.
 #[derive(Default)]
@@ -41,11 +43,8 @@ fn made(pipelines: &str, part: &Part, communicator: Arc<dyn Communicator>) -> Ma
         FieldView::vertex("u", &u),
         FieldView::element("load", &load),
     ];
-    let shown = if part.points.is_empty() { &[] } else { &fields[..] };
-    let channels = [Channel::new("fluid", part.view(), shown)];
-    let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
+    let mut runner = runner(pipelines, communicator);
     let mut made = Made::default();
     for output in runner.run(&Snapshot { cycle: 7, time: 0.25, channels: &channels }) {
         match output {

@@ -1,5 +1,7 @@
 //! Pipelines over a borrowed mesh: surfaces, slices, monitors, conditions, and what goes wrong.
 
+mod common;
+
 use std::sync::Arc;
 
 use tombolo_deform::communicator::Solo;
@@ -8,12 +10,11 @@ use tombolo_deform::mesh::{
 };
 use tombolo_deform::shapes;
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Input, Kept, Snapshot, Source};
-use tombolo_pipelines::language::{Command, Plane, Slice, parse};
+use tombolo_pipelines::language::{Command, Plane, Slice};
 use tombolo_pipelines::run::{Output, Runner, ViewKind};
 
 fn runner(pipelines: &str) -> Runner {
-    let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
-    Runner::new(&parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"))).unwrap()
+    common::runner(pipelines, Arc::new(Solo))
 }
 
 /// Twice the area vector of each polygon, summed up along the normal.

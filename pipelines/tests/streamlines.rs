@@ -1,9 +1,12 @@
 //! Streamlines of fields in closed form, beside VTK's, and over the parts of a mesh.
 
+mod common;
+
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 
+use common::{runner, shown};
 use serde_json::Value;
 use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
@@ -11,8 +14,7 @@ use tombolo_deform::mesh::{CellType, Cells, FeatureSource, Mesh, Vector, ghosts}
 use tombolo_deform::shapes::{box_of_mixed_cells, box_of_tets};
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::files;
-use tombolo_pipelines::language::parse;
-use tombolo_pipelines::run::{Output, Runner};
+use tombolo_pipelines::run::Output;
 
 /// The lines that a stage takes out of a part, on rank 0, and what was told.
 fn lines(
@@ -26,13 +28,11 @@ fn lines(
     let load: Vec<f64> = (0..part.cells.len()).map(|_| 2.5).collect();
     let fields =
         [FieldView::vertex("u", &u), FieldView::vertex("x", &x), FieldView::element("load", &load)];
-    let shown = if part.points.is_empty() { &[] } else { &fields[..] };
-    let channels = [Channel::new("fluid", part.view(), shown)];
-    let text = format!(
-        r#"{{"version": 1, "pipelines": [{{"name": "a", "stages": [{{"streamlines": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}]}}"#
+    let channels = [Channel::new("fluid", part.view(), shown(part, &fields))];
+    let pipeline = format!(
+        r#"{{"name": "a", "stages": [{{"streamlines": {stage}}}, {{"write": {{"file": "a.vtu"}}}}]}}"#
     );
-    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
-    let mut runner = Runner::with_communicator(&config, communicator).unwrap();
+    let mut runner = runner(&pipeline, communicator);
     let (mut extract, mut errors) = (None, Vec::new());
     for output in runner.run(&Snapshot { cycle: 0, time: 0.0, channels: &channels }) {
         match output {

@@ -1,7 +1,39 @@
 //! What several test files need.
 #![allow(dead_code, reason = "each test file uses a part")]
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
+use tombolo_deform::{communicator::Communicator, distributed::Part};
+use tombolo_pipelines::{extract::FieldView, language::parse, run::Runner};
+
+/// Runs pipelines, given one after another with commas between them.
+#[track_caller]
+pub fn runner(pipelines: &str, communicator: Arc<dyn Communicator>) -> Runner {
+    let text = format!(r#"{{"version": 1, "pipelines": [{pipelines}]}}"#);
+    let config = parse(&text, "test.json").unwrap_or_else(|error| panic!("{error}"));
+    Runner::with_communicator(&config, communicator).unwrap()
+}
+
+/// The number of each cell in the whole mesh. What stands in ghosts is nobody's business.
+pub fn cell_numbers(part: &Part) -> Vec<f64> {
+    let number =
+        |cell: usize| part.global_cells.as_ref().map_or(cell as f64, |all| all[cell] as f64);
+    let of_cell = |cell: usize| if part.is_own(cell) { number(cell) } else { f64::NAN };
+    (0..part.cells.len()).map(of_cell).collect()
+}
+
+/// The fields of a part, and none where it is empty.
+pub fn shown<'a, 'b>(part: &Part, fields: &'a [FieldView<'b>]) -> &'a [FieldView<'b>] {
+    if part.points.is_empty() { &[] } else { fields }
+}
+
+/// Adds bits to those of a part's cells: `bits` are of the cells of the whole mesh.
+pub fn hide(part: &mut Part, bits: &[u8]) {
+    let numbers = part.global_cells.clone().unwrap();
+    let of_cells = part.ghosts.get_or_insert_with(|| vec![0; numbers.len()]);
+    of_cells.iter_mut().zip(numbers).for_each(|(of, number)| *of |= bits[number as usize]);
+}
 
 /// Compares errors with what is expected, whose lines may be indented.
 #[track_caller]
