@@ -4,7 +4,7 @@
 use std::process::Command;
 
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Run, Small, Viewer, programs};
+use tombolo_tests::{PATIENCE, Run, Small, Viewer, pinch, programs};
 
 /// Bytes that a file of the run may have, in the blocks of the shell.
 const BLOCKS: u64 = 400;
@@ -13,12 +13,6 @@ const LIMIT: u64 = BLOCKS << 10;
 fn pipelines() -> Value {
     json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": [
         {"name": "hold", "at": {"cycle": 3}, "stages": [{"pause": {}}]}]})
-}
-
-fn pinch(factor: f64) -> Value {
-    json!({"edits": [{"scale_direction": {
-                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
-           "schedule": {"steps": 2, "every": {"steps": 1}}})
 }
 
 /// Lines of an earlier run, so many bytes of them.
@@ -50,7 +44,7 @@ fn limit(run: &Run, bytes: &str) {
 
 /// An order for which that journal has no room.
 fn long() -> Value {
-    let mut long = pinch(0.9);
+    let mut long = pinch(0.9, 2, 1);
     long["edits"][0]["scale_direction"]["name"] = json!("x".repeat(190));
     let edit = long["edits"][0].clone();
     long["edits"] = json!(vec![edit; 20]);
@@ -89,13 +83,13 @@ fn on_a_full_disk_no_order_is_taken_and_the_run_goes_on() {
     driver.wait_for("status", |status| status["journal_lost"].is_string());
     let mut late = Viewer::connect(&link).expect("the run lets in");
     late.wait_for("status", |status| status["journal_lost"].is_string());
-    driver.send(&json!({"id": "short", "order": pinch(0.9)}));
+    driver.send(&json!({"id": "short", "order": pinch(0.9, 2, 1)}));
     driver.wait_for("error", |error| error["id"] == "short");
 
     // There is room again.
     limit(&run, "unlimited:");
     driver.wait_for("status", |status| status["journal_lost"].is_null());
-    driver.send(&json!({"id": "again", "order": pinch(0.9)}));
+    driver.send(&json!({"id": "again", "order": pinch(0.9, 2, 1)}));
     driver.wait_for("order", |order| {
         let reason = order["waits_for"].as_str().unwrap_or_default();
         order["id"] == "again" && reason.contains("paused")
@@ -126,7 +120,7 @@ fn a_run_that_is_killed_has_what_it_acknowledged_and_the_next_goes_on_below() {
         let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
         driver.wait_for("hello", |hello| hello["role"] == "driver");
         let id = format!("round-{round}");
-        driver.send(&json!({"id": id, "order": pinch(0.9)}));
+        driver.send(&json!({"id": id, "order": pinch(0.9, 2, 1)}));
         driver.wait_for("order", |order| order["id"] == id && order["status"] == "accepted");
         run.signal("KILL");
         drop(run);

@@ -154,16 +154,7 @@ fn a_mesh_that_cannot_be_read_is_refused() {
 /// The report of a run that is given an order of this edit at cycle 3.
 fn report_of_order(small: &Small, edit: &Value) -> Value {
     small.write("orders.json", &json!([{"at": {"cycle": 3}, "order": {"edits": [edit]}}]));
-    let arguments = small.arguments(&[
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--headless",
-    ]);
-    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
-    assert!(status.success(), "{text}");
-    small.read("report.json")
+    small.run(&["--pipelines @pipelines.json --orders @orders.json --headless"]).0
 }
 
 #[test]
@@ -425,13 +416,8 @@ fn flow_refuses_orders_beyond_the_limits() {
         (json!({"edits": vec![edit.clone(); 20_000]}), "found 20000 edits, expected at most 16384"),
     ] {
         small.write("orders.json", &json!([{"order": order}]));
-        let arguments = small.arguments(&[
-            "--pipelines",
-            "@pipelines.json",
-            "--headless",
-            "--orders",
-            "@orders.json",
-        ]);
+        let arguments =
+            small.arguments(&["--pipelines @pipelines.json --headless --orders @orders.json"]);
         let (status, text) = Run::flow(&arguments).finish(PATIENCE);
         assert!(!status.success() && text.contains(named) && !text.contains("panicked"), "{text}");
     }

@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::quality::quality;
-use tombolo_tests::{PATIENCE, Run, Small};
+use tombolo_tests::Small;
 
 /// Vertices of the throat: on the wall, 0.1 to either side of the middle.
 fn throat(mesh: &Mesh) -> Vec<usize> {
@@ -26,18 +26,8 @@ fn pinch(order: &Value) -> (Small, Value) {
             {"name": "mesh", "every": {"steps": 1}, "stages": [{"write": {"file": "mesh-{cycle}.vtu"}}]}]}),
     );
     small.write("orders.json", &json!([order, {"at": {"cycle": 45}, "order": {"undo": 1}}]));
-    let more = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--headless",
-        "--steps",
-        "60",
-    ];
-    let (status, text) = Run::flow(&small.arguments(&more)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
-    let report = small.read("report.json");
+    let more = "--pipelines @pipelines.json --orders @orders.json --headless --steps 60";
+    let (report, _) = small.run(&[more]);
     (small, report)
 }
 

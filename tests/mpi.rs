@@ -8,13 +8,6 @@ use tombolo_deform::vector::{cross, length, subtract};
 use tombolo_pipelines::files::{MeshFile, read_mesh};
 use tombolo_tests::{PATIENCE, Run, Small, Viewer, generated_mesh, project};
 
-/// A run to its end on this many ranks; its report, with what it printed.
-fn run_on(ranks: usize, small: &Small, more: &[&str]) -> (Value, String) {
-    let (status, text) = Run::flow_on(ranks, &small.arguments(more)).finish(PATIENCE);
-    assert!(status.success(), "{ranks} ranks, {more:?}:\n{text}");
-    (small.read("report.json"), text)
-}
-
 fn read(small: &Small, name: &str) -> MeshFile {
     read_mesh(small.path(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
@@ -69,9 +62,7 @@ type Dealing<'a> = (usize, &'a [&'a str]);
 /// cycles, the meshes and fields agree.
 fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
     let common = &[common, &["--impulse-tolerance", "1e-6"]].concat()[..];
-    let (status, text) = Run::flow(&small.arguments(common)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
-    let alone = small.read("report.json");
+    let (alone, _) = small.run(common);
     assert_eq!(alone["mesh"]["inverted"], 0);
     let expected = outcomes(&alone);
     assert!(expected.iter().any(|order| order[1] == "applied"), "{alone}");
@@ -81,7 +72,7 @@ fn agrees(small: &Small, common: &[&str], dealings: &[Dealing<'_>]) {
         for name in ["final.vtu", "surface.vtp"] {
             std::fs::remove_file(small.path("out").join(name)).expect("it was written");
         }
-        let (report, text) = run_on(ranks, small, &[common, dealing].concat());
+        let (report, text) = small.run_on(ranks, &[common, dealing].concat());
         let said = format!("{ranks} ranks, {dealing:?}: {text}");
         assert_eq!(outcomes(&report), expected, "{said}");
         for key in ["vertices", "cells", "inverted"] {
@@ -139,15 +130,7 @@ fn a_nozzle_is_pinched_alike_on_any_ranks() {
             {"at": {"cycle": 12}, "order": {"undo": 1}}
         ]),
     );
-    let common = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--headless",
-        "--steps",
-        "16",
-    ];
+    let common = ["--pipelines @pipelines.json --orders @orders.json --headless --steps 16"];
     agrees(&small, &common, &dealings());
 }
 
@@ -164,15 +147,7 @@ fn a_bypass_is_bent_alike_on_any_ranks() {
     }
     small.write("case.json", &case);
     small.write("pipelines.json", &surface_at(4));
-    let common = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--headless",
-        "--steps",
-        "5",
-    ];
+    let common = ["--pipelines @pipelines.json --orders @orders.json --headless --steps 5"];
     // A skeleton depends on how the surface is numbered, if little: where the ranks do not say
     // which vertices are the same, one that is not dragged.
     let runs: [(&str, &[Dealing<'_>]); 2] = [
@@ -249,20 +224,16 @@ fn extracts_of_any_ranks_are_alike() {
                 "features": ["throat"], "fixed": ["inlet", "outlet"], "by": [0, 0, 0.01]}}],
             "schedule": {"steps": 2}}}]),
     );
-    let arguments = ["--pipelines", "@pipelines.json", "--orders", "@orders.json"];
-    let ends = ["--headless", "--steps", "10", "--impulse-tolerance", "1e-6"];
-    let arguments = small.arguments(&[&arguments[..], &ends].concat());
-    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    let options = [
+        "--pipelines @pipelines.json --orders @orders.json",
+        "--headless --steps 10 --impulse-tolerance 1e-6",
+    ];
+    small.run(&options);
     let files = || extracts.each_ref().map(|(file, _)| read(&small, &format!("out/{file}")));
     let alone = files();
     for (ranks, dealing) in dealings() {
         std::fs::remove_dir_all(small.path("out")).expect("it was written");
-        let (_, text) = run_on(
-            ranks,
-            &small,
-            &[&arguments[6..].iter().map(String::as_str).collect::<Vec<_>>()[..], dealing].concat(),
-        );
+        let (_, text) = small.run_on(ranks, &[&options[..], dealing].concat());
         for ((name, _), (found, expected)) in extracts.iter().zip(files().iter().zip(&alone)) {
             let said = format!("{name} on {ranks} ranks, {dealing:?}: {text}");
             assert_eq!(found.mesh.cells().len(), expected.mesh.cells().len(), "{said}");

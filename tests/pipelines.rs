@@ -17,9 +17,7 @@ fn run(file: &str, steps: u32) -> (Small, Value, String) {
     let steps = steps.to_string();
     let more =
         ["--pipelines", &pipelines, "--headless", "--steps", &steps, "--history", "@history.csv"];
-    let (status, text) = Run::flow(&small.arguments(&more)).finish(PATIENCE);
-    assert!(status.success(), "{file}: {text}");
-    let report = small.read("report.json");
+    let (report, text) = small.run(&more);
     (small, report, text)
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Run, Small, Viewer};
+use tombolo_tests::{PATIENCE, Run, Small, Viewer, pinch};
 
 fn pipelines(hold: bool) -> Value {
     let mut list = vec![
@@ -16,12 +16,6 @@ fn pipelines(hold: bool) -> Value {
         list.push(json!({"name": "hold", "at": {"cycle": 3}, "stages": [{"pause": {}}]}));
     }
     json!({"version": 1, "stream": {"listen": "127.0.0.1:0"}, "journal": "journal.jsonl", "pipelines": list})
-}
-
-fn pinch(factor: f64) -> Value {
-    json!({"edits": [{"scale_direction": {
-                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
-           "schedule": {"steps": 4, "every": {"steps": 2}}})
 }
 
 /// Whether an order is planned and begins once the run is paused no more.
@@ -38,9 +32,8 @@ fn last(small: &Small) -> Vec<u8> {
 fn watched(viewers: usize) -> Vec<u8> {
     let small = Small::new();
     small.write("pipelines.json", &pipelines(viewers > 0));
-    small.write("orders.json", &json!([{"at": {"cycle": 5}, "order": pinch(0.8)}]));
-    let mut more =
-        vec!["--pipelines", "@pipelines.json", "--orders", "@orders.json", "--steps", "40"];
+    small.write("orders.json", &json!([{"at": {"cycle": 5}, "order": pinch(0.8, 4, 2)}]));
+    let mut more = vec!["--pipelines @pipelines.json --orders @orders.json --steps 40"];
     if viewers == 0 {
         more.push("--headless");
     }
@@ -71,11 +64,11 @@ fn who_watches_makes_no_difference() {
 fn a_journal_plays_back_to_the_same_bits() {
     let live = Small::new();
     live.write("pipelines.json", &pipelines(true));
-    let mut run = Run::flow(&live.arguments(&["--pipelines", "@pipelines.json", "--steps", "40"]));
+    let mut run = Run::flow(&live.arguments(&["--pipelines @pipelines.json --steps 40"]));
     let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
     driver.wait_for("status", |status| status["paused"] == true);
-    driver.send(&json!({"id": "first", "order": pinch(0.8)}));
+    driver.send(&json!({"id": "first", "order": pinch(0.8, 4, 2)}));
     // What is planned before the run goes on is carried out before it ends.
     driver.wait_for("order", |order| waits_for_resume(order, &order["id"]));
     driver.resume();
@@ -88,18 +81,8 @@ fn a_journal_plays_back_to_the_same_bits() {
     again.write("pipelines.json", &pipelines(false));
     std::fs::copy(live.path("out/journal.jsonl"), again.path("orders.jsonl"))
         .expect("the run wrote its journal");
-    let arguments = again.arguments(&[
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.jsonl",
-        "--headless",
-        "--steps",
-        "40",
-    ]);
-    let (status, text) = Run::flow(&arguments).finish(PATIENCE);
-    assert!(status.success(), "{text}");
-    let replayed = again.read("report.json");
+    let (replayed, _) =
+        again.run(&["--pipelines @pipelines.json --orders @orders.jsonl --headless --steps 40"]);
     assert_eq!(
         replayed["orders"][0]["cycle_applied"], report["orders"][0]["cycle_applied"],
         "{replayed}"
@@ -114,10 +97,10 @@ fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
     let again_held = json!({"name": "again", "at": {"cycle": 9}, "stages": [{"pause": {}}]});
     held["pipelines"].as_array_mut().expect("a list").push(again_held);
     live.write("pipelines.json", &held);
-    let mut run = Run::flow(&live.arguments(&["--pipelines", "@pipelines.json", "--steps", "40"]));
+    let mut run = Run::flow(&live.arguments(&["--pipelines @pipelines.json --steps 40"]));
     let mut driver = Viewer::connect(&run.link()).expect("the run lets in");
     driver.wait_for("hello", |hello| hello["role"] == "driver");
-    let mut order = pinch(0.9);
+    let mut order = pinch(0.9, 4, 2);
     order["schedule"] = json!({"steps": 12, "every": {"steps": 2}});
     driver.wait_for("status", |status| status["paused"] == true);
     driver.send(&json!({"id": "first", "order": order}));
@@ -125,9 +108,9 @@ fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
     driver.resume();
     // The second comes while the mesh is on its way to the first, the third is never carried out.
     driver.wait_for("status", |status| status["cycle"] == 9 && status["paused"] == true);
-    driver.send(&json!({"id": "second", "order": pinch(0.8)}));
+    driver.send(&json!({"id": "second", "order": pinch(0.8, 4, 2)}));
     driver.wait_for("order", |order| waits_for_resume(order, &json!("second")));
-    driver.send(&json!({"id": "third", "order": pinch(0.95)}));
+    driver.send(&json!({"id": "third", "order": pinch(0.95, 4, 2)}));
     driver.send(&json!({"id": "not", "cancel": {"order": "third"}}));
     driver.resume();
     let (status, text) = run.finish(PATIENCE);
@@ -136,11 +119,7 @@ fn a_journal_is_carried_out_again_to_the_bit_where_orders_overlap() {
     let again = Small::new();
     again.write("pipelines.json", &pipelines(false));
     std::fs::copy(live.path("out/journal.jsonl"), again.path("run.jsonl")).expect("a journal");
-    let mut arguments =
-        vec!["--pipelines", "@pipelines.json", "--replay", "@run.jsonl", "--headless"];
-    arguments.extend(["--steps", "40"]);
-    let (status, text) = Run::flow(&again.arguments(&arguments)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    again.run(&["--pipelines @pipelines.json --replay @run.jsonl --headless --steps 40"]);
     assert!(last(&again) == last(&live), "the journal gives another flow");
     let shapes = |of: &Small| -> Vec<String> {
         let journal = String::from_utf8(of.bytes("out/journal.jsonl")).expect("UTF-8");

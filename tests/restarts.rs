@@ -4,13 +4,7 @@ use std::time::Duration;
 
 use fastrand::Rng;
 use serde_json::{Value, json};
-use tombolo_tests::{PATIENCE, Run, Small, Viewer};
-
-fn pinch(factor: f64, steps: u32, every: u32) -> Value {
-    json!({"edits": [{"scale_direction": {
-                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
-           "schedule": {"steps": steps, "every": {"steps": every}}})
-}
+use tombolo_tests::{PATIENCE, Run, Small, Viewer, pinch};
 
 /// Orders that overlap, are refused and are undone, and one that a pipeline gives.
 fn prepared() -> Small {
@@ -36,16 +30,8 @@ fn prepared() -> Small {
 }
 
 fn arguments<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    let all = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@orders.json",
-        "--steps",
-        "40",
-        "--headless",
-    ];
-    all.into_iter().chain(more.iter().copied()).collect()
+    let all = "--pipelines @pipelines.json --orders @orders.json --steps 40 --headless";
+    [&[all], more].concat()
 }
 
 /// The mesh and the fields at the end, and the shape before it.
@@ -56,8 +42,7 @@ fn results(small: &Small) -> [Vec<u8>; 2] {
 #[test]
 fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
     let whole = prepared();
-    let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    whole.run(&arguments(&[]));
     let small = prepared();
     let state = small.path("out/flow.state");
     std::fs::create_dir_all(small.path("out")).expect("a folder");
@@ -99,10 +84,8 @@ fn a_run_that_is_killed_and_restarted_ends_as_one_that_never_was() {
     // The journals of all its pieces are that of one run.
     let replay = prepared();
     let journal = small.path("out/journal.jsonl").display().to_string();
-    let all = arguments(&["--replay", &journal]);
-    let more: Vec<&str> = all.into_iter().filter(|it| !it.contains("orders")).collect();
-    let (status, text) = Run::flow(&replay.arguments(&more)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    let options = "--pipelines @pipelines.json --steps 40 --headless --replay";
+    replay.run(&[options, &journal]);
     assert!(results(&replay) == results(&whole), "the replay differs");
 }
 
@@ -142,8 +125,7 @@ fn an_order_that_is_being_planned_at_a_signal_is_not_lost() {
 #[test]
 fn a_run_that_is_asked_to_stop_saves_its_state() {
     let whole = prepared();
-    let (status, text) = Run::flow(&whole.arguments(&arguments(&[]))).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    whole.run(&arguments(&[]));
     let small = prepared();
     small.write(
         "stop.json",
@@ -151,19 +133,8 @@ fn a_run_that_is_asked_to_stop_saves_its_state() {
                 {"at": {"cycle": 11}, "order": pinch(1.2, 5, 2)},
                 {"at": {"cycle": 13}, "stop": {}}]),
     );
-    let stopped = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@stop.json",
-        "--headless",
-        "--steps",
-        "40",
-        "--checkpoint-every",
-        "1000",
-    ];
-    let (status, text) = Run::flow(&small.arguments(&stopped)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    let stopped = "--pipelines @pipelines.json --orders @stop.json --headless --steps 40 --checkpoint-every 1000";
+    small.run(&[stopped]);
     let state = small.path("out/flow.state").display().to_string();
     // The rest of the orders: other commands take the place of those that were to come.
     small.write(
@@ -171,19 +142,8 @@ fn a_run_that_is_asked_to_stop_saves_its_state() {
         &json!([{"at": {"cycle": 15}, "order": {"undo": 9}},
                 {"at": {"cycle": 28}, "order": {"undo": 1, "schedule": {"steps": 3, "every": {"steps": 2}}}}]),
     );
-    let rest = [
-        "--pipelines",
-        "@pipelines.json",
-        "--orders",
-        "@rest.json",
-        "--headless",
-        "--steps",
-        "40",
-        "--restart",
-        &state,
-    ];
-    let (status, text) = Run::flow(&small.arguments(&rest)).finish(PATIENCE);
-    assert!(status.success(), "{text}");
+    let rest = "--pipelines @pipelines.json --orders @rest.json --headless --steps 40 --restart";
+    small.run(&[rest, &state]);
     assert!(results(&small) == results(&whole));
     let torn = small.path("torn");
     std::fs::write(&torn, &small.bytes("out/flow.state")[..1000]).expect("written");

@@ -18,7 +18,7 @@ pub use generated::{generated_mesh, generated_surfaces};
 pub use mesh::{NOZZLE_FEATURES, write_nozzle};
 pub use proxy::{Proxy, free_ports};
 pub use run::{Run, program, programs, tombolo};
-pub use small::Small;
+pub use small::{Small, pinch};
 pub use viewer::{Link, Message, Viewer, driving};
 
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@ use tempfile::TempDir;
 use tombolo_deform::mesh::Mesh;
 use tombolo_pipelines::files::read_mesh;
 
-use crate::write_nozzle;
+use crate::{PATIENCE, Run, write_nozzle};
 
 /// A nozzle of about 2 000 tetrahedra with its case, ready to run in milliseconds a step.
 pub struct Small {
@@ -96,7 +96,9 @@ impl Small {
         read_mesh(self.path(name)).unwrap_or_else(|error| panic!("{name}: {error}")).mesh
     }
 
-    /// The arguments of `flow` for this case, its output in `out/`.
+    /// The arguments of `flow` for this case, its output in `out/`. An entry that begins with an
+    /// option may hold several arguments with blanks between them. Names of files of this directory
+    /// are written as `@name`.
     ///
     /// # Panics
     /// Never, in a directory whose name is UTF-8.
@@ -112,14 +114,46 @@ impl Small {
             "--report".to_owned(),
             text(&self.path("report.json")),
         ];
-        for argument in more {
-            // Names of files of this directory are written as `@name`.
-            arguments.push(
+        for entry in more {
+            let several = entry.starts_with("--").then(|| entry.split_whitespace());
+            let one = several.is_none().then_some(*entry);
+            arguments.extend(several.into_iter().flatten().chain(one).map(|argument| {
                 argument
                     .strip_prefix('@')
-                    .map_or_else(|| (*argument).to_owned(), |name| text(&self.path(name))),
-            );
+                    .map_or_else(|| argument.to_owned(), |name| text(&self.path(name)))
+            }));
         }
         arguments
     }
+
+    /// Runs `flow` to its end; its report, and what it printed.
+    ///
+    /// # Panics
+    /// Where it fails or writes no report.
+    pub fn run(&self, more: &[&str]) -> (Value, String) {
+        self.ended(Run::flow(&self.arguments(more)), &format!("{more:?}"))
+    }
+
+    /// Runs `flow` on several ranks of MPI to its end; its report, and what it printed.
+    ///
+    /// # Panics
+    /// Where it fails or writes no report.
+    pub fn run_on(&self, ranks: usize, more: &[&str]) -> (Value, String) {
+        let run = Run::flow_on(ranks, &self.arguments(more));
+        self.ended(run, &format!("{ranks} ranks, {more:?}"))
+    }
+
+    fn ended(&self, run: Run, what: &str) -> (Value, String) {
+        let (status, text) = run.finish(PATIENCE);
+        assert!(status.success(), "{what}:\n{text}");
+        (self.read("report.json"), text)
+    }
+}
+
+/// An order that pinches the throat of the nozzle to a part of its height.
+#[must_use]
+pub fn pinch(factor: f64, steps: u32, every: u32) -> Value {
+    json!({"edits": [{"scale_direction": {
+                "features": ["throat"], "fixed": ["inlet", "outlet"], "factors": [1, 1, factor], "harmonic_order": 2}}],
+           "schedule": {"steps": steps, "every": {"steps": every}}})
 }
