@@ -1,8 +1,11 @@
 //! The mesh is the solver's: what is handed out is asked for, and what is lent at the next call
 //! says whether it was done.
 
+mod common;
+
 use std::sync::Arc;
 
+use common::squeeze;
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, MeshMotion, OrderReport, OrderStatus, Settings, Step,
@@ -25,10 +28,6 @@ fn at(cycle: u64, order: &Value, steps: u32) -> Value {
     let mut order = order.clone();
     order["schedule"] = json!({"steps": steps});
     json!({"at": {"cycle": cycle}, "order": order})
-}
-
-fn squeeze(by: f64) -> Value {
-    json!({"edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -by]}}]})
 }
 
 fn settings(orders: &Value, method: &str) -> Settings {

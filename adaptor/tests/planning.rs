@@ -13,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
+use common::{LINK_TO_ALL, Solver, Viewer, config, has_status, long, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     OrderStatus, Settings,
@@ -24,17 +24,6 @@ use tombolo::{
 fn solver() -> Solver {
     let settings = Settings { config: config(LINK_TO_ALL), ..Settings::default() };
     Solver::of_box([24, 24, 24], settings)
-}
-
-/// An order of as many shapes as there may be.
-fn long(by: f64) -> Value {
-    let mut order = squeeze(by);
-    order["schedule"] = json!({"steps": 10_000});
-    order
-}
-
-fn has_status<'s>(id: &'s str, status: &'s str) -> impl Fn(&Value) -> bool + 's {
-    move |order| order["id"] == id && order["status"] == status
 }
 
 fn driven(solver: &mut Solver) -> Viewer {

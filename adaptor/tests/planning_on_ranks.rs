@@ -8,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{LINK_TO_ALL, Viewer, config, squeeze};
-use serde_json::{Value, json};
+use common::{LINK_TO_ALL, Viewer, config, has_status, long, squeeze};
+use serde_json::json;
 use tombolo::{
     Adaptor, Settings, Step,
     communicator::{Communicator, threads},
@@ -21,13 +21,6 @@ use tombolo::{
 };
 
 const RANKS: usize = 3;
-
-/// An order whose shapes take long to find.
-fn long() -> Value {
-    let mut order = squeeze(0.3);
-    order["schedule"] = json!({"steps": 10_000});
-    order
-}
 
 /// A rank's last cycle, the orders that moved its mesh, and on rank 0 the viewer's findings.
 type Outcome<T> = (u64, Vec<String>, Option<T>);
@@ -87,15 +80,12 @@ fn assert_same<T>(outcomes: &[Outcome<T>]) {
 #[test]
 fn an_order_is_cancelled_while_all_ranks_find_its_shapes() {
     let outcomes = run(|viewer| {
-        let is = |id: &'static str, status: &'static str| {
-            move |order: &Value| order["id"] == id && order["status"] == status
-        };
-        viewer.send(&json!({"id": "long", "order": long()}));
-        viewer.wait_for("order", is("long", "computing"));
+        viewer.send(&json!({"id": "long", "order": long(0.3)}));
+        viewer.wait_for("order", has_status("long", "computing"));
         viewer.send(&json!({"id": "c", "cancel": {"order": "long"}}));
-        let told = viewer.wait_for("order", is("long", "rejected"));
+        let told = viewer.wait_for("order", has_status("long", "rejected"));
         viewer.send(&json!({"id": "short", "order": squeeze(0.1)}));
-        viewer.wait_for("order", is("short", "applied"));
+        viewer.wait_for("order", has_status("short", "applied"));
         told["reason"].as_str().map(str::to_owned)
     });
     assert_eq!(outcomes[0].2, Some(Some("cancelled by c1".into())));
@@ -109,12 +99,12 @@ fn an_order_is_cancelled_while_all_ranks_find_its_shapes() {
 fn a_forecast_is_withdrawn_while_all_ranks_find_it() {
     let outcomes = run(|viewer| {
         let begun = Instant::now();
-        viewer.send(&json!({"id": "whole", "forecast": long()}));
+        viewer.send(&json!({"id": "whole", "forecast": long(0.3)}));
         viewer.wait_for("forecast", |told| told["id"] == "whole");
         let whole = begun.elapsed();
         for (pause, edits) in [(0.0, 0.31), (0.1, 0.32)] {
             let pause = whole.mul_f64(pause);
-            let mut long = long();
+            let mut long = long(0.3);
             long["edits"] = squeeze(edits)["edits"].clone();
             let begun = Instant::now();
             viewer.send(&json!({"id": "long", "forecast": long}));

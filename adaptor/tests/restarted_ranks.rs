@@ -4,7 +4,7 @@ mod common;
 
 use std::{path::Path, sync::Arc, thread::JoinHandle};
 
-use common::{Viewer, bits, config, squeeze};
+use common::{Viewer, bits, config, has_status, long, squeeze};
 use serde_json::{Value, json};
 use tombolo::{
     Adaptor, OrderReport, Settings, Step,
@@ -20,15 +20,8 @@ use tombolo::{
 const CONFIG: &str = r#"{"version": 1, "journal": "journal.jsonl",
     "stream": {"listen": "127.0.0.1:0"}, "pipelines": []}"#;
 
-/// An order of as many shapes as there may be.
-fn long() -> Value {
-    let mut order = squeeze(0.3);
-    order["schedule"] = json!({"steps": 10_000});
-    order
-}
-
 fn has(viewer: &mut Viewer, id: &str, status: &str) -> Value {
-    viewer.wait_for("order", |order| order["id"] == id && order["status"] == status)
+    viewer.wait_for("order", has_status(id, status))
 }
 
 /// The end of a run on one rank.
@@ -113,7 +106,7 @@ fn same_on_all_ranks(ended: &[Ended]) {
 fn leave_open(viewer: &mut Viewer) {
     viewer.send(&json!({"id": "first", "order": squeeze(0.1)}));
     has(viewer, "first", "applied");
-    viewer.send(&json!({"id": "long", "order": long()}));
+    viewer.send(&json!({"id": "long", "order": long(0.3)}));
     has(viewer, "long", "computing");
     viewer.send(&json!({"stop": {}}));
     // Its shapes are given up, and it waits again.
@@ -131,7 +124,7 @@ fn has_again(viewer: &mut Viewer, id: &str) -> Value {
 fn take_back(viewer: &mut Viewer) {
     for (id, is_new) in [("long", false), ("longer", true)] {
         if is_new {
-            viewer.send(&json!({"id": id, "order": long()}));
+            viewer.send(&json!({"id": id, "order": long(0.3)}));
         }
         has(viewer, id, "computing");
         viewer.send(&json!({"id": format!("cancel-{id}"), "cancel": {"order": id}}));

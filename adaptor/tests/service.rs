@@ -4,7 +4,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{LINK_TO_ALL, Solver, Viewer, config, squeeze};
+use common::{LINK_TO_ALL, Solver, Viewer, config, has_status, long, squeeze};
 use serde_json::{Value, json};
 use tokio_tungstenite::tungstenite::Message;
 use tombolo::{
@@ -13,10 +13,6 @@ use tombolo::{
     deform::edit::Edit,
     pipelines::limits::PENDING_BYTES,
 };
-
-fn has_status<'s>(id: &'s str, status: &'s str) -> impl Fn(&Value) -> bool + 's {
-    move |order| order["id"] == id && order["status"] == status
-}
 
 /// An order that moves these vertices by next to nothing.
 fn displacement(vertices: &[u32], seed: f64) -> Value {
@@ -31,9 +27,7 @@ fn beside_a_long_plan(settings: Settings) -> (Solver, Viewer) {
     let mut viewer = Viewer::connect(&solver.adaptor);
     viewer.hello();
     solver.step();
-    let mut long = squeeze(0.3);
-    long["schedule"] = json!({"steps": 10_000});
-    viewer.send(&json!({"id": "long", "order": long}));
+    viewer.send(&json!({"id": "long", "order": long(0.3)}));
     solver.step_until_told(&mut viewer, "order", has_status("long", "computing"));
     (solver, viewer)
 }

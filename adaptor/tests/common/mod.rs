@@ -46,6 +46,18 @@ pub fn squeeze(by: f64) -> Value {
     json!({"edits": [{"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.0, 0.0, -by]}}]})
 }
 
+/// Squeezes the box in as many shapes as there may be, which take long to find.
+pub fn long(by: f64) -> Value {
+    let mut order = squeeze(by);
+    order["schedule"] = json!({"steps": 10_000});
+    order
+}
+
+/// Whether a message is about this order and has this status.
+pub fn has_status<'s>(id: &'s str, status: &'s str) -> impl Fn(&Value) -> bool + 's {
+    move |order| order["id"] == id && order["status"] == status
+}
+
 pub struct Solver {
     pub adaptor: Adaptor,
     pub reference: Mesh,
