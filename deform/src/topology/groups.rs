@@ -2,15 +2,19 @@
 
 /// Items in groups, one group after the other, each in the order in which its items came.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Groups<T> {
+pub struct Groups<T> {
     /// Where each group begins among the items, and where the last one ends.
     pub offsets: Vec<usize>,
+    /// The items of all groups.
     pub items: Vec<T>,
 }
 
 impl<T: Copy + Default> Groups<T> {
     /// Deals out items to `count` groups, each by the number of its group: a counting sort, linear
     /// in time and memory.
+    ///
+    /// # Panics
+    /// Where a group is not below `count`.
     pub fn new(count: usize, items: impl Iterator<Item = (u32, T)> + Clone) -> Self {
         let mut offsets = vec![0; count + 1];
         // Nested iterators are quicker where they run their own loops.
@@ -31,7 +35,11 @@ impl<T: Copy + Default> Groups<T> {
 
 impl<T> Groups<T> {
     /// The items of a group.
+    ///
+    /// # Panics
+    /// Where there is no such group.
     #[inline]
+    #[must_use]
     pub fn of(&self, group: u32) -> &[T] {
         &self.items[self.offsets[group as usize]..self.offsets[group as usize + 1]]
     }

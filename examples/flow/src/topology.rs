@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 use tombolo_deform::linear::{SparseMatrix, reverse_cuthill_mckee};
 use tombolo_deform::mesh::{CellType, Mesh};
+use tombolo_deform::topology::Groups;
 
 use crate::SolverError;
 
@@ -32,14 +33,12 @@ pub struct Topology {
     owners: Vec<u64>,
     /// This rank.
     rank: u64,
-    /// Row starts into `incidences`.
-    pub incidence_starts: Vec<usize>,
     /// For each vertex, the elements around it.
-    pub incidences: Vec<Incidence>,
+    pub incidences: Groups<Incidence>,
 }
 
 /// An element as seen from one of its vertices.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Incidence {
     /// The element.
     pub element: u32,
@@ -92,32 +91,30 @@ impl Topology {
         });
         let diagonal = diagonal.collect();
 
-        let mut incidence_starts = vec![0usize; vertex_count + 1];
-        for &vertex in elements.iter().flatten() {
-            incidence_starts[vertex as usize + 1] += 1;
-        }
-        for vertex in 0..vertex_count {
-            incidence_starts[vertex + 1] += incidence_starts[vertex];
-        }
-        let mut next = incidence_starts.clone();
-        let mut incidences =
-            vec![Incidence { element: 0, local: 0, slots: [0; 4] }; elements.len() * 4];
-        for (element, vertices) in elements.iter().enumerate() {
-            for (local, &vertex) in vertices.iter().enumerate() {
-                let row = zeros.row(vertex as usize).0;
-                let slots = vertices.map(|column| {
+        let around = elements.iter().zip(0..).flat_map(|(vertices, element)| {
+            let seen_from = move |(local, &vertex): (u8, &u32)| {
+                (vertex, Incidence { element, local, ..Incidence::default() })
+            };
+            (0..).zip(vertices).map(seen_from)
+        });
+        let mut incidences = Groups::new(vertex_count, around);
+        let mut rows = 0..vertex_count;
+        let mut crowded = None;
+        incidences.for_each_mut(|around| {
+            let Some(vertex) = rows.next() else { return };
+            let row = zeros.row(vertex).0;
+            for incidence in around {
+                incidence.slots = elements[incidence.element as usize].map(|column| {
                     let slot = row.partition_point(|&entry| entry < column);
                     u16::try_from(slot).unwrap_or(u16::MAX)
                 });
-                if slots.contains(&u16::MAX) {
-                    return Err(SolverError::Valence {
-                        vertex: vertex_order[vertex as usize] as usize,
-                    });
+                if incidence.slots.contains(&u16::MAX) {
+                    crowded = crowded.or(Some(vertex_order[vertex] as usize));
                 }
-                incidences[next[vertex as usize]] =
-                    Incidence { element: number(element), local: local as u8, slots };
-                next[vertex as usize] += 1;
             }
+        });
+        if let Some(vertex) = crowded {
+            return Err(SolverError::Valence { vertex });
         }
         Ok(Self {
             vertex_rank,
@@ -128,7 +125,6 @@ impl Topology {
             owners: vertex_order.iter().map(|&vertex| owners[vertex as usize]).collect(),
             rank,
             vertex_order,
-            incidence_starts,
             incidences,
         })
     }
@@ -170,7 +166,7 @@ impl Topology {
     /// The elements around a vertex.
     #[must_use]
     pub fn around(&self, vertex: usize) -> &[Incidence] {
-        &self.incidences[self.incidence_starts[vertex]..self.incidence_starts[vertex + 1]]
+        self.incidences.of(number(vertex))
     }
 
     /// Values given in the mesh's numbering, in the solver's.
@@ -198,26 +194,12 @@ fn adjacency<'a>(
     row_count: usize,
     elements: impl Iterator<Item = &'a [u32; 4]> + Clone,
 ) -> (Vec<usize>, Vec<u32>) {
-    let mut starts = vec![0usize; vertex_count + 1];
-    for &vertex in elements.clone().flatten() {
-        starts[vertex as usize + 1] += 4;
-    }
-    for vertex in 0..vertex_count {
-        starts[vertex + 1] += starts[vertex];
-    }
-    let mut next = starts.clone();
-    let mut all = vec![0u32; starts[vertex_count]];
-    for vertices in elements {
-        for &row in vertices {
-            let slot = next[row as usize];
-            all[slot..slot + 4].copy_from_slice(vertices);
-            next[row as usize] += 4;
-        }
-    }
+    let around = elements.flat_map(|vertices| vertices.map(|row| (row, *vertices)));
+    let around = Groups::new(vertex_count, around);
     let rows: Vec<Vec<u32>> = (0..vertex_count)
         .into_par_iter()
         .map(|row| {
-            let mut columns = all[starts[row]..starts[row + 1]].to_vec();
+            let mut columns = around.of(number(row)).as_flattened().to_vec();
             if row >= row_count {
                 columns.clear();
             }

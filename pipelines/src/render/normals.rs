@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use tombolo_deform::communicator::{Communicator, Reader, Writer};
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::mesh::Vector;
+use tombolo_deform::topology::Groups;
 use tombolo_deform::vector::{cross, dot, length, scale, subtract};
 
 use super::lattice::Lattice;
@@ -42,30 +43,18 @@ pub(super) fn of_corners(
     shown: &Shown,
     faces: &[Vector],
 ) -> Result<Vec<Vector>, DistributedError> {
-    let mut offsets = vec![0_usize; scene.points.len() + 1];
-    scene.corners.iter().for_each(|&point| offsets[point as usize + 1] += 1);
-    (1..offsets.len()).for_each(|point| offsets[point] += offsets[point - 1]);
-    let mut around = vec![0_u32; scene.corners.len()];
-    let mut next = offsets.clone();
-    for face in 0..scene.faces() {
-        for &point in scene.face(face) {
-            #[expect(clippy::cast_possible_truncation, reason = "faces of 32 bits")]
-            {
-                around[next[point as usize]] = face as u32;
-            }
-            next[point as usize] += 1;
-        }
-    }
-    let of_point = |point: usize| {
-        around[offsets[point]..offsets[point + 1]].iter().map(|&face| faces[face as usize])
-    };
+    #[expect(clippy::cast_possible_truncation, reason = "faces of 32 bits")]
+    let corners = (0..scene.faces())
+        .flat_map(|face| scene.face(face).iter().map(move |&point| (point, face as u32)));
+    let around = Groups::new(scene.points.len(), corners);
+    let of_point = |point: u32| around.of(point).iter().map(|&face| faces[face as usize]);
     let elsewhere = elsewhere(communicator, shown, &of_point)?;
     let mut normals = Vec::with_capacity(scene.corners.len());
     for (face, &own) in faces.iter().enumerate() {
         for &point in scene.face(face) {
             let mut sum = [0_i64; 3];
             let others = elsewhere.get(&point).into_iter().flatten().copied();
-            for normal in of_point(point as usize).chain(others) {
+            for normal in of_point(point).chain(others) {
                 // Faces of cells that were given left-handed look inwards.
                 let along = dot(normal, own);
                 if along.abs() > SHARP {
@@ -87,7 +76,7 @@ pub(super) fn of_corners(
 fn elsewhere<I: Iterator<Item = Vector>>(
     communicator: &dyn Communicator,
     shown: &Shown,
-    of_point: &dyn Fn(usize) -> I,
+    of_point: &dyn Fn(u32) -> I,
 ) -> Result<HashMap<u32, Vec<Vector>>, DistributedError> {
     let mut found: HashMap<u32, Vec<Vector>> = HashMap::new();
     if communicator.size() == 1 {
@@ -95,7 +84,7 @@ fn elsewhere<I: Iterator<Item = Vector>>(
     }
     let mut message = Writer::default();
     for (point, name) in &shown.shared {
-        let normals: Vec<Vector> = of_point(*point as usize).collect();
+        let normals: Vec<Vector> = of_point(*point).collect();
         name.vertices.iter().for_each(|&vertex| message.u32(vertex));
         message.u64(name.layer);
         message.u64(normals.len() as u64);
