@@ -22,6 +22,7 @@
 //! );
 //! ```
 
+mod as_text;
 mod cameras;
 mod check;
 mod check_pipeline;

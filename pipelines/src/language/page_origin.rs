@@ -2,8 +2,9 @@
 
 use std::{fmt, str::FromStr};
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize};
 
+use super::as_text::as_text;
 use super::relay_address::is_host;
 use crate::limits::EMBEDDERS;
 
@@ -79,17 +80,7 @@ impl fmt::Display for PageOrigin {
     }
 }
 
-impl Serialize for PageOrigin {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&self.0)
-    }
-}
-
-impl<'de> Deserialize<'de> for PageOrigin {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
-    }
-}
+as_text!(PageOrigin);
 
 /// The pages that may show a viewer inside of them, [`EMBEDDERS`] at most.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
