@@ -206,6 +206,15 @@ pub(super) fn finite(value: f64) -> Result<(), Problem> {
     }
 }
 
+/// Refuses what is not a finite number above 0.
+pub(super) fn above_zero(value: f64) -> Result<(), Problem> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(Problem::new(format!("found {value}, expected a number above 0")))
+    }
+}
+
 /// Refuses a list in which something stands twice; `what` says what is listed.
 pub(super) fn none_twice<T: Eq + Hash>(list: &[T], what: &str) -> Result<(), Problem> {
     let mut before = HashSet::new();

@@ -6,7 +6,7 @@ use tombolo_deform::edit::{BoxRegion, SphereRegion};
 use tombolo_deform::mesh::Vector;
 
 use super::Problem;
-use super::error::finite;
+use super::error::{above_zero, finite};
 use crate::limits::CUTS;
 
 /// A plane.
@@ -279,7 +279,7 @@ impl Cylinder {
     fn check(&self) -> Result<(), Problem> {
         check_point(self.origin, "origin")?;
         check_direction(self.axis, "axis")?;
-        check_radius(self.radius)
+        above_zero(self.radius).map_err(|problem| problem.within("radius"))
     }
 }
 
@@ -348,16 +348,9 @@ pub(super) fn check_direction(direction: Vector, key: &str) -> Result<(), Proble
     Err(Problem::new("expected a direction, whose length is not 0").within(key))
 }
 
-fn check_radius(radius: f64) -> Result<(), Problem> {
-    if radius.is_finite() && radius > 0.0 {
-        return Ok(());
-    }
-    Err(Problem::new(format!("found {radius}, expected a number above 0")).within("radius"))
-}
-
 fn check_sphere(sphere: &SphereRegion) -> Result<(), Problem> {
     check_point(sphere.center, "center")?;
-    check_radius(sphere.radius)
+    above_zero(sphere.radius).map_err(|problem| problem.within("radius"))
 }
 
 pub(super) fn check_box(lower: Vector, upper: Vector, may_be_flat: bool) -> Result<(), Problem> {

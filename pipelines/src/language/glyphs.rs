@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 
+use super::error::above_zero;
 use super::{ProbeGrid, ProbeLine, Problem, SeedFeatures, SeedPlane, Seeds};
 use crate::limits::GLYPHS;
 
@@ -163,11 +164,6 @@ impl Glyphs {
             GlyphsAt::Every(_) => {}
             GlyphsAt::Points(seeds) => seeds.check()?,
         }
-        match self.size {
-            Some(size) if !(size > 0.0 && size.is_finite()) => {
-                Err(Problem::new(format!("found {size}, expected a number above 0")).within("size"))
-            }
-            _ => Ok(()),
-        }
+        self.size.map_or(Ok(()), above_zero).map_err(|problem| problem.within("size"))
     }
 }

@@ -9,7 +9,7 @@ use tombolo_deform::mesh::Vector;
 use tombolo_deform::schedule::Interval;
 
 use super::derived::check_name;
-use super::error::{finite, none_twice};
+use super::error::{above_zero, finite, none_twice};
 use super::extracts::check_point;
 use super::{Problem, nearest};
 use crate::limits::{BINS, HISTORY};
@@ -492,12 +492,6 @@ impl Decimate {
             let message = format!("found {}, expected a number above 0, at most 1", self.fraction);
             return Err(Problem::new(message).within("fraction"));
         }
-        match self.error {
-            Some(error) if !(error > 0.0 && error.is_finite()) => {
-                let message = format!("found {error}, expected a number above 0");
-                Err(Problem::new(message).within("error"))
-            }
-            _ => Ok(()),
-        }
+        self.error.map_or(Ok(()), above_zero).map_err(|problem| problem.within("error"))
     }
 }

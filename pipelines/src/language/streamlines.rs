@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 
-use super::error::finite;
+use super::error::above_zero;
 use super::extracts::check_point;
 use super::{ProbeGrid, ProbeLine, Problem};
 use crate::limits::{SEEDS, STEPS};
@@ -230,12 +230,7 @@ impl Seeds {
 impl Streamlines {
     pub(super) fn check(&self) -> Result<(), Problem> {
         self.seeds.check()?;
-        if let Some(length) = self.max_length
-            && !(length > 0.0 && length.is_finite())
-        {
-            let message = format!("found {length}, expected a number above 0");
-            return Err(Problem::new(message).within("max_length"));
-        }
+        self.max_length.map_or(Ok(()), above_zero).map_err(|it| it.within("max_length"))?;
         if self.max_steps == 0 {
             return Err(Problem::new("found 0, expected at least 1 step").within("max_steps"));
         }
