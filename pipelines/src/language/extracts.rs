@@ -340,6 +340,16 @@ pub(super) fn check_point(point: Vector, key: &str) -> Result<(), Problem> {
     Ok(())
 }
 
+/// Refuses coordinates of the key `points` that are not finite.
+pub(super) fn check_points(points: &[Vector]) -> Result<(), Problem> {
+    for (index, point) in points.iter().enumerate() {
+        for (axis, &value) in point.iter().enumerate() {
+            finite(value).map_err(|it| it.at(axis).at(index).within("points"))?;
+        }
+    }
+    Ok(())
+}
+
 pub(super) fn check_direction(direction: Vector, key: &str) -> Result<(), Problem> {
     let length = direction.iter().fold(0.0_f64, |sum, x| sum.hypot(*x));
     if length.is_normal() {

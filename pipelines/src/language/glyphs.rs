@@ -47,7 +47,7 @@ pub enum GlyphShape {
 }
 
 /// Glyphs as they stand in JSON.
-#[derive(Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct GlyphsKeys {
     /// The shape of each glyph.
@@ -98,16 +98,10 @@ impl TryFrom<GlyphsKeys> for Glyphs {
 
     fn try_from(keys: GlyphsKeys) -> Result<Self, String> {
         let GlyphsKeys { shape, field, scaled, size, .. } = keys;
-        let places = [
-            keys.count.map(GlyphsAt::Spread),
-            keys.every.map(GlyphsAt::Every),
-            keys.points.map(|it| GlyphsAt::Points(Seeds::Points(it))),
-            keys.line.map(|it| GlyphsAt::Points(Seeds::Line(it))),
-            keys.grid.map(|it| GlyphsAt::Points(Seeds::Grid(it))),
-            keys.plane.map(|it| GlyphsAt::Points(Seeds::Plane(it))),
-            keys.features.map(|it| GlyphsAt::Points(Seeds::Features(it))),
-        ];
-        let mut given = places.into_iter().flatten();
+        let GlyphsKeys { points, line, grid, plane, features, .. } = keys;
+        let vertices = [keys.count.map(GlyphsAt::Spread), keys.every.map(GlyphsAt::Every)];
+        let seeds = Seeds::given(points, line, grid, plane, features).map(GlyphsAt::Points);
+        let mut given = vertices.into_iter().flatten().chain(seeds);
         let at = given.next().unwrap_or(GlyphsAt::Spread(500));
         if given.next().is_some() {
             return Err("found more than one of `count`, `every`, `points`, `line`, `grid`, \
@@ -123,19 +117,7 @@ impl TryFrom<GlyphsKeys> for Glyphs {
 
 impl From<Glyphs> for GlyphsKeys {
     fn from(Glyphs { shape, field, scaled, size, at }: Glyphs) -> Self {
-        let mut keys = Self {
-            shape,
-            field,
-            scaled,
-            size,
-            count: None,
-            every: None,
-            points: None,
-            line: None,
-            grid: None,
-            plane: None,
-            features: None,
-        };
+        let mut keys = Self { shape, field, scaled, size, ..Self::default() };
         match at {
             GlyphsAt::Spread(count) => keys.count = Some(count),
             GlyphsAt::Every(every) => keys.every = Some(every),

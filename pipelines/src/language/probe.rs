@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 
 use super::Problem;
-use super::error::finite;
-use super::extracts::{check_box, check_point};
+use super::extracts::{check_box, check_point, check_points};
 use crate::limits::PROBES;
 
 /// The fields at given points. Points in no cell are left out.
@@ -118,12 +117,7 @@ impl Probe {
                     return Err(Problem::new("expected at least one point").within("points"));
                 }
                 PROBES.check(points.len()).map_err(|it| Problem::from(it).within("points"))?;
-                for (index, &point) in points.iter().enumerate() {
-                    for (axis, &value) in point.iter().enumerate() {
-                        finite(value).map_err(|it| it.at(axis).at(index).within("points"))?;
-                    }
-                }
-                Ok(())
+                check_points(points)
             }
             ProbeAt::Line(line) => line.check().map_err(|problem| problem.within("line")),
             ProbeAt::Grid(grid) => grid.check().map_err(|problem| problem.within("grid")),

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tombolo_deform::mesh::Vector;
 
 use super::error::above_zero;
-use super::extracts::check_point;
+use super::extracts::{check_point, check_points};
 use super::{ProbeGrid, ProbeLine, Problem};
 use crate::limits::{SEEDS, STEPS};
 
@@ -86,7 +86,7 @@ pub enum Direction {
 }
 
 /// Streamlines as they stand in JSON.
-#[derive(Clone, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct StreamlinesKeys {
     /// The vertex field that is followed, of 2 or 3 components.
@@ -133,14 +133,8 @@ impl TryFrom<StreamlinesKeys> for Streamlines {
 
     fn try_from(keys: StreamlinesKeys) -> Result<Self, String> {
         let StreamlinesKeys { field, direction, max_length, max_steps, error, .. } = keys;
-        let seeds = [
-            keys.points.map(Seeds::Points),
-            keys.line.map(Seeds::Line),
-            keys.grid.map(Seeds::Grid),
-            keys.plane.map(Seeds::Plane),
-            keys.features.map(Seeds::Features),
-        ];
-        let mut given = seeds.into_iter().flatten();
+        let StreamlinesKeys { points, line, grid, plane, features, .. } = keys;
+        let mut given = Seeds::given(points, line, grid, plane, features);
         match (given.next(), given.next()) {
             (Some(seeds), None) => {
                 Ok(Self { field, seeds, direction, max_length, max_steps, error })
@@ -159,30 +153,36 @@ impl TryFrom<StreamlinesKeys> for Streamlines {
 impl From<Streamlines> for StreamlinesKeys {
     fn from(stage: Streamlines) -> Self {
         let Streamlines { field, seeds, direction, max_length, max_steps, error } = stage;
-        let mut keys = Self {
-            field,
-            points: None,
-            line: None,
-            grid: None,
-            plane: None,
-            features: None,
-            direction,
-            max_length,
-            max_steps,
-            error,
-        };
+        let keys = Self { field, direction, max_length, max_steps, error, ..Self::default() };
         match seeds {
-            Seeds::Points(points) => keys.points = Some(points),
-            Seeds::Line(line) => keys.line = Some(line),
-            Seeds::Grid(grid) => keys.grid = Some(grid),
-            Seeds::Plane(plane) => keys.plane = Some(plane),
-            Seeds::Features(features) => keys.features = Some(features),
+            Seeds::Points(points) => Self { points: Some(points), ..keys },
+            Seeds::Line(line) => Self { line: Some(line), ..keys },
+            Seeds::Grid(grid) => Self { grid: Some(grid), ..keys },
+            Seeds::Plane(plane) => Self { plane: Some(plane), ..keys },
+            Seeds::Features(features) => Self { features: Some(features), ..keys },
         }
-        keys
     }
 }
 
 impl Seeds {
+    /// Those of the keys that are there.
+    pub(super) fn given(
+        points: Option<Vec<Vector>>,
+        line: Option<ProbeLine>,
+        grid: Option<ProbeGrid>,
+        plane: Option<SeedPlane>,
+        features: Option<SeedFeatures>,
+    ) -> impl Iterator<Item = Self> {
+        let all = [
+            points.map(Self::Points),
+            line.map(Self::Line),
+            grid.map(Self::Grid),
+            plane.map(Self::Plane),
+            features.map(Self::Features),
+        ];
+        all.into_iter().flatten()
+    }
+
     pub(super) fn check(&self) -> Result<(), Problem> {
         let count = |count: usize, key: &str| {
             if count == 0 {
@@ -194,11 +194,7 @@ impl Seeds {
         match self {
             Seeds::Points(points) => {
                 count(points.len(), "points")?;
-                for (index, point) in points.iter().enumerate() {
-                    for (axis, &value) in point.iter().enumerate() {
-                        finite(value).map_err(|it| it.at(axis).at(index).within("points"))?;
-                    }
-                }
+                check_points(points)?;
             }
             Seeds::Line(line) => {
                 line.check().map_err(located("line"))?;
