@@ -39,8 +39,6 @@ mod assemble;
 mod displacement;
 mod error;
 mod gmsh;
-#[cfg(feature = "vtkio")]
-mod model;
 mod pictures;
 mod scanner;
 #[cfg(test)]
@@ -58,10 +56,10 @@ pub use displacement::{
     read_displacement, read_displacements, write_displacement,
 };
 pub use error::{FileError, Position, Problem};
-#[cfg(feature = "vtkio")]
-pub use model::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_vtkio};
 pub use pictures::{Database, write_picture};
 pub use vtk::{Compression, Series};
+#[cfg(feature = "vtkio")]
+pub use vtk::{extract_from_vtkio, extract_to_vtkio, mesh_from_vtkio, mesh_to_vtkio};
 pub use whole::write_durably;
 use whole::write_whole;
 

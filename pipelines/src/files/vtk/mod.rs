@@ -18,11 +18,11 @@ mod xml_file;
 pub(super) use index::Index;
 pub(super) use legacy::parse as parse_legacy;
 #[cfg(feature = "vtkio")]
-pub(super) use model::{extract_of, mesh_of};
+pub use model::{extract_from_vtkio, mesh_from_vtkio};
 pub use series::Series;
 pub(super) use write::{Format, check_polygonal, from_extract, from_mesh};
 #[cfg(feature = "vtkio")]
-pub(super) use write::{extract_to_vtkio, mesh_to_vtkio};
+pub use write::{extract_to_vtkio, mesh_to_vtkio};
 pub(super) use xml::parse as parse_xml;
 pub use xml_file::Compression;
 

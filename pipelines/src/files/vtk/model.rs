@@ -223,16 +223,27 @@ fn vtkio_type(cell_type: CellType) -> Result<vtk::CellType, Problem> {
     })
 }
 
-/// The mesh in a dataset of vtkio's.
-pub(in super::super) fn mesh_of(file: &vtk::Vtk) -> Result<MeshFile, FileError> {
+/// The mesh in an unstructured grid or polygonal data of vtkio's, all pieces as one: what
+/// [`read_mesh`] makes of a file with the same contents.
+///
+/// # Errors
+/// [`FileError`] for another kind of dataset, for a piece that is a file not loaded yet, and for a
+/// mesh that is none. It names the file by its path, or by the title where it has none.
+///
+/// [`read_mesh`]: super::super::read_mesh
+pub fn mesh_from_vtkio(file: &vtk::Vtk) -> Result<MeshFile, FileError> {
     dataset_of(&file.data)
         .map_err(Flaw::from)
         .and_then(Dataset::into_mesh_file)
         .map_err(|flaw| flaw.in_file(name_of(file)))
 }
 
-/// A dataset of vtkio's, every cell and point of it.
-pub(in super::super) fn extract_of(file: &vtk::Vtk) -> Result<Extract, FileError> {
+/// An unstructured grid or polygonal data of vtkio's as an extract: every point, every cell of any
+/// dimension, and every array of numbers as a field.
+///
+/// # Errors
+/// As [`mesh_from_vtkio`].
+pub fn extract_from_vtkio(file: &vtk::Vtk) -> Result<Extract, FileError> {
     dataset_of(&file.data)
         .map_err(Flaw::from)
         .and_then(Dataset::into_extract)

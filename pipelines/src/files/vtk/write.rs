@@ -48,18 +48,39 @@ pub(in super::super) fn from_mesh(
     grid.write(format, compression)
 }
 
-/// An extract as vtkio's model has it.
+/// An extract in vtkio's model: an unstructured grid in one piece, coordinates in double precision,
+/// each field an array of its number type, the features of cells the array `features`.
+///
+/// Fields of the mesh as a whole and the names of features have no place in that model.
+///
+/// # Errors
+/// [`Problem`] for fields whose length is not that of the extract, for two of one name, and for
+/// cells that vtkio has no type for. Polyhedra are there as in a legacy file: vtkio writes them to
+/// `.vtk`, not to `.vtu`.
 #[cfg(feature = "vtkio")]
-pub(in super::super) fn extract_to_vtkio(extract: &Extract) -> Result<vtkio::Vtk, Problem> {
+pub fn extract_to_vtkio(extract: &Extract) -> Result<vtkio::Vtk, Problem> {
     grid_of_extract(extract)?.to_vtkio()
 }
 
-/// A mesh with its fields as vtkio's model has it.
+/// A mesh with its fields in vtkio's model. Tagged faces stand as cells behind the mesh's own, which
+/// the array `features` tells apart: -1 for a cell, or the number of a face's feature.
+///
+/// # Errors
+/// As [`extract_to_vtkio`].
+///
+/// ```
+/// use tombolo_deform::shapes::box_of_tets;
+/// use tombolo_pipelines::files::{mesh_from_vtkio, mesh_to_vtkio};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mesh = box_of_tets([2, 2, 2], [0.0; 3], [1.0; 3]);
+/// let file = mesh_to_vtkio(&mesh, &[])?;
+/// assert_eq!(mesh_from_vtkio(&file)?.mesh.cells(), mesh.cells());
+/// # Ok(())
+/// # }
+/// ```
 #[cfg(feature = "vtkio")]
-pub(in super::super) fn mesh_to_vtkio(
-    mesh: &Mesh,
-    fields: &[Field],
-) -> Result<vtkio::Vtk, Problem> {
+pub fn mesh_to_vtkio(mesh: &Mesh, fields: &[Field]) -> Result<vtkio::Vtk, Problem> {
     let (mut grid, owners) = grid_of_mesh(mesh, fields)?;
     let fields = with_faces(fields, mesh.cells().len(), &owners)?;
     grid.add_fields(&fields)?;
