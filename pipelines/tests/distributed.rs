@@ -20,23 +20,6 @@ use tombolo_pipelines::{
     run::{Output, Runner},
 };
 
-/// A repeatable shuffle.
-fn shuffled(count: usize, seed: u64) -> Vec<usize> {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut order: Vec<usize> = (0..count).collect();
-    for place in (1..count).rev() {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        order.swap(place, (state >> 33) as usize % (place + 1));
-    }
-    order
-}
-
-/// The part with its vertices and cells in another order.
-fn renumbered(part: &Part, seed: u64) -> Part {
-    part.reordered(&shuffled(part.points.len(), seed), &shuffled(part.cells.len(), seed + 1))
-}
-
 /// Cells dealt out in the order of their numbers; the rank `empty` gets none.
 fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usize> {
     let ranks: Vec<usize> = (0..ranks).filter(|&rank| Some(rank) != empty).collect();
@@ -137,7 +120,7 @@ fn extracts_are_those_of_one_process() {
         let outcomes = threads::run(ranks, |ranks| {
             let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), ghosts).unwrap();
             if shuffle > 0 {
-                part = renumbered(&part, shuffle + ranks.rank() as u64);
+                part = part.shuffled(shuffle + ranks.rank() as u64);
                 part.global_vertices = None;
             }
             made(&part, Arc::new(ranks))

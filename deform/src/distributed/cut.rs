@@ -156,4 +156,26 @@ impl Part {
                 .map(|ghosts| cells.iter().map(|&cell| ghosts[cell]).collect()),
         }
     }
+    /// The part with its vertices and cells in an order that looks random and is the same for the
+    /// same seed.
+    #[must_use]
+    pub fn shuffled(&self, seed: u64) -> Self {
+        let vertices = order(self.points.len(), seed);
+        let cells = order(self.cells.len(), seed ^ 0x5DEE_CE66);
+        self.reordered(&vertices, &cells)
+    }
+}
+
+/// A random order (Fisher and Yates) from a seed (splitmix64).
+pub(crate) fn order(length: usize, mut seed: u64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..length).collect();
+    for last in (1..length).rev() {
+        seed = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = seed;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^= mixed >> 31;
+        order.swap(last, usize::try_from(mixed % (last as u64 + 1)).unwrap_or(last));
+    }
+    order
 }

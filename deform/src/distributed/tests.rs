@@ -10,26 +10,10 @@ use crate::{
     volume::{Deform, Method, VolumeOperator},
 };
 
+use super::cut::order;
 use super::*;
 use crate::communicator::{Communicator, Counted, threads};
 use crate::mesh::SharedVertices;
-
-/// A repeatable shuffle.
-fn shuffled(count: usize, seed: u64) -> Vec<usize> {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut order: Vec<usize> = (0..count).collect();
-    for index in (1..count).rev() {
-        state =
-            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        order.swap(index, (state >> 33) as usize % (index + 1));
-    }
-    order
-}
-
-/// The part with its vertices and cells in another order.
-pub(crate) fn renumbered(part: &Part, seed: u64) -> Part {
-    part.reordered(&shuffled(part.points.len(), seed), &shuffled(part.cells.len(), seed + 1))
-}
 
 /// Cells dealt out by where they lie, in slanted slabs; `empty` gets none.
 pub(crate) fn dealt(mesh: &Mesh, ranks: usize, empty: Option<usize>) -> Vec<usize> {
@@ -100,7 +84,7 @@ fn the_surface_is_that_of_one_process() {
                 let outcomes = threads::run(ranks, |ranks| {
                     let mut part = Part::cut(&mesh, &of_cells, ranks.rank(), ghosts).unwrap();
                     if shuffle > 0 {
-                        part = renumbered(&part, shuffle + ranks.rank() as u64);
+                        part = part.shuffled(shuffle + ranks.rank() as u64);
                     }
                     if !numbers {
                         (part.global_vertices, part.global_cells) = (None, None);
@@ -147,10 +131,8 @@ fn values_at_shared_vertices_are_the_same_everywhere() {
         count
     };
     threads::run(4, |ranks| {
-        let part = renumbered(
-            &Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap(),
-            11 + ranks.rank() as u64,
-        );
+        let part = Part::cut(&mesh, &of_cells, ranks.rank(), true).unwrap();
+        let part = part.shuffled(11 + ranks.rank() as u64);
         let ranks: Arc<dyn Communicator> = Arc::new(ranks);
         let shared = SharedVertices::find(&ranks, &part).unwrap();
         // How many cells each vertex has, each rank counting its own.
@@ -386,9 +368,9 @@ fn scattered_parts_are_solved_too() {
     let mesh = box_of_tets([14, 12, 11], [0.0; 3], [1.2, 1.0, 1.0]);
     let count = mesh.cells().len();
     for (ranks, of_cells) in [
-        (3, shuffled(count, 7).into_iter().map(|index| index % 3).collect::<Vec<usize>>()),
+        (3, order(count, 7).into_iter().map(|index| index % 3).collect::<Vec<usize>>()),
         (40, dealt(&mesh, 40, None)),
-        (24, shuffled(count, 9).into_iter().map(|index| index % 24).collect()),
+        (24, order(count, 9).into_iter().map(|index| index % 24).collect()),
     ] {
         let (off, iterations) = deformed_in_parts(&mesh, Method::Elasticity, ranks, &of_cells);
         assert!(off < 1e-8, "{ranks} ranks: {off:e} in {iterations} iterations");

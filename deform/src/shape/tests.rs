@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::*;
 use crate::communicator::{Communicator, threads};
-use crate::distributed::tests::{dealt, renumbered};
+use crate::distributed::tests::dealt;
 use crate::distributed::{Part, domain};
 use crate::features::FeatureSettings;
 use crate::mesh::{CellType, Cells, FeatureSource};
@@ -50,7 +50,7 @@ fn on_ranks<T: Send>(
     threads::run(deal.ranks, |ranks| {
         let mut part = Part::cut(mesh, of_cells, ranks.rank(), deal.ghosts).unwrap();
         if deal.shuffle > 0 {
-            part = renumbered(&part, deal.shuffle + ranks.rank() as u64);
+            part = part.shuffled(deal.shuffle + ranks.rank() as u64);
         }
         let numbers: Vec<usize> =
             part.global_vertices.iter().flatten().map(|&number| number as usize).collect();

@@ -98,7 +98,7 @@ impl Share {
             .map(|eight| usize::try_from(u64::from_le_bytes(*eight)).unwrap_or(0))
             .collect();
         let cut = Part::cut(mesh, &of_cells, rank, true).map(|part| match dealing.shuffle {
-            Some(seed) => shuffled(&part, seed.wrapping_add(rank as u64)),
+            Some(seed) => part.shuffled(seed.wrapping_add(rank as u64)),
             None => part,
         });
         let made = cut.and_then(|part| Ok((part.view().to_mesh()?, part.own_cells(), part)));
@@ -211,27 +211,6 @@ fn own_patches(part: &Part, surface: &Surface, mesh: &Mesh, patches: Vec<Patch>)
 fn sorted(mut triangle: [u32; 3]) -> [u32; 3] {
     triangle.sort_unstable();
     triangle
-}
-
-/// A part with its vertices and cells in another order.
-fn shuffled(part: &Part, seed: u64) -> Part {
-    let vertices = order(part.points.len(), seed);
-    let cells = order(part.cells.len(), seed ^ 0x5DEE_CE66);
-    part.reordered(&vertices, &cells)
-}
-
-/// A random order (Fisher and Yates) from a seed (splitmix64).
-fn order(length: usize, mut seed: u64) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..length).collect();
-    for last in (1..length).rev() {
-        seed = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = seed;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^= mixed >> 31;
-        order.swap(last, usize::try_from(mixed % (last as u64 + 1)).unwrap_or(last));
-    }
-    order
 }
 
 /// A communicator that several parts of a run share.
