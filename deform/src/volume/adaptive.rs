@@ -481,6 +481,7 @@ mod tests {
     use crate::mesh::Mesh;
     use crate::quality::{Refusal, keeps, quality};
     use crate::shapes;
+    use crate::volume::tests::cube_boundary;
 
     fn volume<'a>(
         domain: &'a Domain,
@@ -498,11 +499,6 @@ mod tests {
         fn at(&mut self, _: f64, to: f64, _: &[Vector]) -> Result<Vec<Vector>, Infallible> {
             Ok((self.0)(to))
         }
-    }
-
-    fn boundary(mesh: &Mesh) -> Vec<u32> {
-        let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
-        (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
     }
 
     /// The unit cube twisted about its axis by `degrees` from bottom to top.
@@ -529,7 +525,7 @@ mod tests {
             shapes::box_of_tets([6, 6, 8], [0.0; 3], [1.0; 3]),
             shapes::box_of_hexahedra([6, 6, 8], [0.0; 3], [1.0; 3]),
         ] {
-            let boundary = boundary(&mesh);
+            let boundary = cube_boundary(&mesh);
             let end = twisted(&mesh, &boundary, 180.0);
             assert!(!keeps(&mesh, mesh.points(), &single(&mesh, &boundary, &end), &guard));
             let start: Arc<[Vector]> = mesh.points().into();
@@ -562,7 +558,7 @@ mod tests {
     #[test]
     fn what_cannot_be_followed_is_told_with_the_fraction_reached() {
         let mesh = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let start: Arc<[Vector]> = mesh.points().into();
         let pressed = |to: f64| {
             let place = |&vertex: &u32| {

@@ -319,11 +319,7 @@ mod tests {
     use crate::mesh::Mesh;
     use crate::shapes;
     use crate::vector::subtract;
-
-    fn boundary(mesh: &Mesh) -> Vec<u32> {
-        let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
-        (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
-    }
+    use crate::volume::tests::cube_boundary;
 
     fn meshes() -> [Mesh; 3] {
         let size = ([3, 3, 3], [0.0; 3], [1.0; 3]);
@@ -337,7 +333,7 @@ mod tests {
     #[test]
     fn what_is_possible_is_not_called_impossible() {
         for mesh in meshes() {
-            let boundary = boundary(&mesh);
+            let boundary = cube_boundary(&mesh);
             let mut points = mesh.points().to_vec();
             assert_eq!(Impossible::find(&mesh, &boundary, &points, 0.0), None);
             // Wherever the inside lies.
@@ -379,7 +375,7 @@ mod tests {
     #[test]
     fn a_corner_without_a_free_vertex_is_named() {
         let mesh = shapes::box_of_hexahedra([2, 2, 2], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let mut points = mesh.points().to_vec();
         let corner = points.iter().position(|point| *point == [0.0; 3]).unwrap();
         points[corner] = [0.3, 0.3, 0.3];

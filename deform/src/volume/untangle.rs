@@ -304,11 +304,7 @@ mod tests {
     use crate::quality::quality;
     use crate::shapes;
     use crate::vector::{dot, subtract};
-
-    fn boundary(mesh: &Mesh) -> Vec<u32> {
-        let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
-        (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
-    }
+    use crate::volume::tests::cube_boundary;
 
     /// The inside of a cube thrown about by far more than the size of a cell.
     fn thrown(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
@@ -329,7 +325,7 @@ mod tests {
             shapes::box_of_tets([5, 6, 4], [0.0; 3], [1.0; 3]),
             shapes::box_of_hexahedra([5, 6, 4], [0.0; 3], [1.0; 3]),
         ] {
-            let boundary = boundary(&mesh);
+            let boundary = cube_boundary(&mesh);
             let mut points = thrown(&mesh, &boundary);
             assert!(quality(mesh.cells(), &points).inverted > 50);
             assert!(Untangler::new(&mesh, &boundary).untangle(&mut points, 0.0));
@@ -347,7 +343,7 @@ mod tests {
     #[test]
     fn slivers_of_the_reference_are_no_failure() {
         let whole = shapes::box_of_tets([4, 4, 4], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&whole);
+        let boundary = cube_boundary(&whole);
         let mut points = whole.points().to_vec();
         let middle = points.iter().position(|point| *point == [0.5; 3]).unwrap();
         // Almost in the plane of one of its cells' faces.
@@ -363,7 +359,7 @@ mod tests {
     #[test]
     fn what_cannot_be_untangled_is_said() {
         let mesh = shapes::box_of_tets([3, 3, 3], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let untangler = Untangler::new(&mesh, &boundary);
         let mut mirrored: Vec<Vector> = mesh.points().iter().map(|&[x, y, z]| [x, y, -z]).collect();
         assert!(!untangler.untangle(&mut mirrored, 0.0));
@@ -379,7 +375,7 @@ mod tests {
     #[test]
     fn the_same_bits_whatever_the_number_of_threads() {
         let mesh = shapes::box_of_tets([8, 8, 8], [0.0; 3], [1.0; 3]);
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let untangler = Untangler::new(&mesh, &boundary);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -2,11 +2,7 @@ use super::*;
 use crate::mesh::Mesh;
 use crate::quality::{normalized_scaled_jacobians, quality};
 use crate::shapes;
-
-fn boundary(mesh: &Mesh) -> Vec<u32> {
-    let on = |p: &Vector| p.iter().any(|&x| x == 0.0 || x == 1.0);
-    (0..).zip(mesh.points()).filter(|(_, p)| on(p)).map(|(vertex, _)| vertex).collect()
-}
+use crate::volume::tests::cube_boundary;
 
 /// The inside shaken by less than would turn a cell inside out.
 fn shaken(mesh: &Mesh, boundary: &[u32]) -> Vec<Vector> {
@@ -40,7 +36,7 @@ fn meshes() -> Vec<Mesh> {
 #[test]
 fn the_worst_cells_and_the_mean_get_better() {
     for mesh in meshes() {
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let start = shaken(&mesh, &boundary);
         let mut points = start.clone();
         let (least, mean) = spread(&mesh, &start);
@@ -58,7 +54,7 @@ fn the_worst_cells_and_the_mean_get_better() {
 #[test]
 fn good_and_broken_meshes_stay_as_they_are() {
     for mesh in meshes() {
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let improver = Improver::new(&mesh, &boundary);
         // Turned and moved.
         let (s, c) = 0.7f64.sin_cos();
@@ -82,7 +78,7 @@ fn good_and_broken_meshes_stay_as_they_are() {
 #[test]
 fn what_gains_nothing_stays_as_it_was_solved() {
     let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
-    let boundary = boundary(&mesh);
+    let boundary = cube_boundary(&mesh);
     let sheared: Vec<Vector> =
         mesh.points().iter().map(|&[x, y, z]| [x + 0.08 * z * z, y, z]).collect();
     let (least, _) = spread(&mesh, &sheared);
@@ -99,7 +95,7 @@ fn what_gains_nothing_stays_as_it_was_solved() {
 #[test]
 fn others_are_not_lifted_above_cells_that_cannot_be_moved() {
     let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
-    let boundary = boundary(&mesh);
+    let boundary = cube_boundary(&mesh);
     let improver = Improver::new(&mesh, &boundary);
     let sheared: Vec<Vector> =
         mesh.points().iter().map(|&[x, y, z]| [x + 0.3 * z * z, y, z]).collect();
@@ -120,7 +116,7 @@ fn others_are_not_lifted_above_cells_that_cannot_be_moved() {
 #[test]
 fn sweeps_end_where_they_gain_nothing() {
     for mesh in meshes() {
-        let boundary = boundary(&mesh);
+        let boundary = cube_boundary(&mesh);
         let improver = Improver::new(&mesh, &boundary);
         let of_sweeps = |sweeps| {
             let mut points = shaken(&mesh, &boundary);
@@ -136,7 +132,7 @@ fn sweeps_end_where_they_gain_nothing() {
 #[test]
 fn vertices_that_sleep_would_have_stayed() {
     let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
-    let improver = Improver::new(&mesh, &boundary(&mesh));
+    let improver = Improver::new(&mesh, &cube_boundary(&mesh));
     let mut points = improver.numbering.gather(mesh.points()).into_owned();
     for point in points.iter_mut().filter(|point| point.iter().all(|&x| x > 0.0 && x < 0.3)) {
         *point = [point[0] + 0.04, point[1] - 0.03, point[2] + 0.02];
@@ -158,7 +154,7 @@ fn vertices_that_sleep_would_have_stayed() {
 #[test]
 fn the_same_bits_whatever_the_number_of_threads() {
     let mesh = shapes::box_of_tets([9, 9, 9], [0.0; 3], [1.0; 3]);
-    let boundary = boundary(&mesh);
+    let boundary = cube_boundary(&mesh);
     let improver = Improver::new(&mesh, &boundary);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -27,7 +27,7 @@ fn noise(seed: usize) -> f64 {
 }
 
 /// The vertices of the unit cube's surface.
-fn cube_boundary(mesh: &Mesh) -> Vec<u32> {
+pub(super) fn cube_boundary(mesh: &Mesh) -> Vec<u32> {
     let outside = |point: &Vector| point.iter().any(|&x| x == 0.0 || x == 1.0);
     (0..).zip(mesh.points()).filter(|(_, point)| outside(point)).map(|(vertex, _)| vertex).collect()
 }
