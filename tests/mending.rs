@@ -6,6 +6,7 @@ use std::{cell::RefCell, process::Command, sync::Arc};
 use proptest::{prelude::*, test_runner::TestRunner};
 use serde_json::{Value, json};
 use tombolo_deform::shape::{CurrentShape, Outcome, Plan, Refused, Request, Shaper};
+use tombolo_deform::vector::determinant;
 use tombolo_deform::{
     edit::Edit,
     features::FeatureSettings,
@@ -357,9 +358,7 @@ fn the_floor_of_prisms_is_that_of_their_worst_corner() {
                 .iter()
                 .map(|x| x.iter().map(|x| x * x).sum::<f64>().sqrt())
                 .product::<f64>();
-            let volume = a[0] * (b[1] * c[2] - b[2] * c[1])
-                + a[1] * (b[2] * c[0] - b[0] * c[2])
-                + a[2] * (b[0] * c[1] - b[1] * c[0]);
+            let volume = determinant(a, b, c);
             // Sound cells: each corner has the sign of its order.
             2.0 / 3.0f64.sqrt() * volume.abs() / product
         };

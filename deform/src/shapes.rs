@@ -15,7 +15,7 @@
 //! `u32::MAX` vertices: their arguments are written by a programmer, never read from a user.
 
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, TaggedFaces, Vector};
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::vector::{add, cross, determinant, dot, scale, subtract};
 
 /// The features of a box, in the order of their tags 1 to 6.
 pub const BOX_FEATURES: [&str; 6] = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"];
@@ -417,9 +417,7 @@ mod tests {
             for i in 1..face.len() - 1 {
                 let [a, b, c] =
                     [face[0], face[i], face[i + 1]].map(|vertex| mesh.points()[vertex as usize]);
-                total += a[0] * (b[1] * c[2] - b[2] * c[1])
-                    + a[1] * (b[2] * c[0] - b[0] * c[2])
-                    + a[2] * (b[0] * c[1] - b[1] * c[0]);
+                total += determinant(a, b, c);
             }
         });
         total
@@ -471,9 +469,7 @@ mod tests {
         let mut six = 0.0;
         for (_, triangle) in mesh.cells().iter() {
             let [a, b, c] = [0, 1, 2].map(|corner| mesh.points()[triangle[corner] as usize]);
-            six += a[0] * (b[1] * c[2] - b[2] * c[1])
-                + a[1] * (b[2] * c[0] - b[0] * c[2])
-                + a[2] * (b[0] * c[1] - b[1] * c[0]);
+            six += determinant(a, b, c);
         }
         let exact = 2.0 * std::f64::consts::PI.powi(2) * 2.0 * 0.25;
         assert!((six / 6.0 / exact - 1.0).abs() < 0.02, "{} against {exact}", six / 6.0);

@@ -1,6 +1,7 @@
 //! Meshes whose vertices stand in other orders than VTK's.
 
 use proptest::prelude::*;
+use tombolo_deform::vector::determinant;
 use tombolo_deform::{
     features::FeatureSettings,
     mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, Vector},
@@ -41,10 +42,7 @@ fn mirror_image(mesh: &Mesh) -> Mesh {
 fn enclosed(surface: &Surface) -> f64 {
     let volume = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|vertex| surface.points()[vertex as usize]);
-        (a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0]))
-            / 6.0
+        determinant(a, b, c) / 6.0
     };
     surface.triangles().iter().map(volume).sum()
 }

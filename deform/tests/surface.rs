@@ -23,6 +23,7 @@ use tombolo_deform::edit::{Edit, Editor, HarmonicOrder, ScaleDirection, ScaleNor
 use tombolo_deform::features::FeatureSettings;
 use tombolo_deform::mesh::{FeatureSource, Mesh, Vector};
 use tombolo_deform::surface::Surface;
+use tombolo_deform::vector::determinant;
 
 const ORDERS: [HarmonicOrder; 3] =
     [HarmonicOrder::Harmonic, HarmonicOrder::Biharmonic, HarmonicOrder::Triharmonic];
@@ -85,9 +86,7 @@ fn enclosed_volume(surface: &Surface, points: &[Vector]) -> f64 {
     let mut six = 0.0;
     for triangle in surface.triangles() {
         let [a, b, c] = triangle.map(|vertex| points[vertex as usize]);
-        six += a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        six += determinant(a, b, c);
     }
     six / 6.0
 }

@@ -9,6 +9,7 @@ use tombolo_deform::communicator::{Communicator, Solo, threads};
 use tombolo_deform::distributed::{Part, in_order};
 use tombolo_deform::mesh::{Mesh, Vector};
 use tombolo_deform::shapes::{box_of_tets, torus};
+use tombolo_deform::vector::determinant;
 use tombolo_pipelines::extract::{Channel, Extract, FieldView, Snapshot};
 use tombolo_pipelines::run::Output;
 
@@ -54,11 +55,7 @@ fn alone(stage: &str, mesh: &Mesh) -> (Arc<Extract>, Vec<f64>) {
 /// Six times the volume within a closed surface.
 fn volume(extract: &Extract) -> f64 {
     let at = |point: u32| extract.points[point as usize];
-    let of = |[a, b, c]: [Vector; 3]| {
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-            + a[1] * (b[2] * c[0] - b[0] * c[2])
-            + a[2] * (b[0] * c[1] - b[1] * c[0])
-    };
+    let of = |[a, b, c]: [Vector; 3]| determinant(a, b, c);
     extract.cells.iter().map(|(_, corners)| of([0, 1, 2].map(|corner| at(corners[corner])))).sum()
 }
 
