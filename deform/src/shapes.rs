@@ -15,7 +15,7 @@
 //! `u32::MAX` vertices: their arguments are written by a programmer, never read from a user.
 
 use crate::mesh::{CellType, Cells, FeatureSource, Mesh, MeshError, TaggedFaces, Vector};
-use crate::vector::{add, cross, determinant, dot, scale, subtract};
+use crate::vector::{add, cross, dot, scale, subtract, unit};
 
 /// The features of a box, in the order of their tags 1 to 6.
 pub const BOX_FEATURES: [&str; 6] = ["x-min", "x-max", "y-min", "y-max", "z-min", "z-max"];
@@ -186,7 +186,6 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
 #[must_use]
 pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
     let around = around.max(3);
-    let unit = |vector: Vector| scale(vector, 1.0 / dot(vector, vector).sqrt());
     let tangent = |i: usize| {
         let along = |i: usize| unit(subtract(axis[i + 1], axis[i]));
         let [before, after] = [i.max(1) - 1, i.min(axis.len() - 2)].map(along);
@@ -409,6 +408,7 @@ mod tests {
     use super::*;
     use crate::features::FeatureSettings;
     use crate::surface::Surface;
+    use crate::vector::determinant;
 
     /// Six times the volume enclosed by the faces of a cell, by the divergence theorem.
     fn six_volumes(mesh: &Mesh, cell: usize) -> f64 {

@@ -49,6 +49,13 @@ pub fn length(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
+/// The vector of length 1 in the direction of `a`; not finite where `a` is 0.
+#[inline]
+#[must_use]
+pub fn unit(a: Vector) -> Vector {
+    scale(a, 1.0 / length(a))
+}
+
 /// The Euclidean distance between two points.
 #[inline]
 #[must_use]

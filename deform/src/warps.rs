@@ -7,7 +7,7 @@
 //! of space, which is one-to-one on the box.
 
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::vector::{add, cross, dot, scale, subtract, unit};
 
 /// A motion of the boundary of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,12 +135,12 @@ fn knot([x, y, z]: Vector, height: f64) -> Vector {
     let t = 0.3 + 5.7 * z / height;
     let step = 1e-4;
     let along = subtract(curve(t + step), curve(t - step));
-    let along = scale(along, 1.0 / dot(along, along).sqrt());
+    let along = unit(along);
     // Outwards from the axis of the torus that the curve winds around.
     let centre = curve(t);
     let out = [centre[0], centre[1], 2.0 * centre[2]];
     let out = subtract(out, scale(along, dot(out, along)));
-    let out = scale(out, 1.0 / dot(out, out).sqrt());
+    let out = unit(out);
     let across = cross(along, out);
     add(centre, add(scale(out, x), scale(across, y)))
 }

@@ -2,7 +2,7 @@
 //! coordinates, and their derivatives.
 
 use tombolo_deform::mesh::{CellType, Vector};
-use tombolo_deform::vector::{add, cross, dot, length, scale, subtract};
+use tombolo_deform::vector::{add, cross, dot, length, scale, subtract, unit};
 
 /// The weights of a cell's vertices at a point, and how they grow along the parametric coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ impl Shape {
         }
         if dimension == 2 {
             let normal = cross(tangents[0], tangents[1]);
-            tangents[2] = scale(normal, 1.0 / length(normal));
+            tangents[2] = unit(normal);
         }
         tangents
     }

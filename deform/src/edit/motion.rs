@@ -6,7 +6,7 @@ use super::kinds::{Displacement, Edit};
 use crate::bounds::Bounds;
 use crate::mesh::Vector;
 use crate::surface::Surface;
-use crate::vector::{add, cross, dot, scale, subtract, triangle_normal};
+use crate::vector::{add, cross, length, scale, subtract, triangle_normal, unit};
 
 /// The motion of a handle as a sum of scalar fields on its vertices times constant vectors:
 /// `displacement(v) = sum_j bases[j][v] * coefficients[j]`, in the order of [`Handle::vertices`].
@@ -117,7 +117,7 @@ fn rotation_minus_identity(axis: Vector, degrees: f64) -> [Vector; 3] {
     // In units of its largest part, so that no length overflows.
     let largest = axis.iter().fold(0.0f64, |largest, part| largest.max(part.abs()));
     let axis = axis.map(|part| part / largest);
-    let axis = scale(axis, 1.0 / dot(axis, axis).sqrt());
+    let axis = unit(axis);
     let (sine, versine) = sine_and_versine(degrees);
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| {
         let turned = cross(axis, unit);
@@ -177,7 +177,7 @@ fn handle_normals(
             return Ok([0.0; 3]);
         }
         let normal = if has_own[local] { own[local] } else { all[local] };
-        let length = dot(normal, normal).sqrt();
+        let length = length(normal);
         if length > 0.0 && length.is_finite() {
             Ok(normal.map(|part| part / length))
         } else {

@@ -5,7 +5,7 @@ use std::f64::consts::{SQRT_2, TAU};
 
 use super::{CellType, Cells};
 use crate::number::real;
-use crate::vector::{Vector, add, cross, determinant, dot, mean, subtract};
+use crate::vector::{Vector, add, cross, determinant, dot, length, mean, subtract};
 
 /// The order in which a voxel's vertices make a hexahedron.
 pub(crate) const VOXEL_AS_HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
@@ -173,8 +173,7 @@ fn triangle([a, b, c]: [Vector; 3]) -> f64 {
     let (ab, ac, bc) = (subtract(b, a), subtract(c, a), subtract(c, b));
     let (lab, lac, lbc) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
     let normal = cross(ab, ac);
-    2.0 / 3.0f64.sqrt()
-        * ratio(dot(normal, normal).sqrt(), (lab * lac).max(lab * lbc).max(lac * lbc).sqrt())
+    2.0 / 3.0f64.sqrt() * ratio(length(normal), (lab * lac).max(lab * lbc).max(lac * lbc).sqrt())
 }
 
 fn quad(points: [Vector; 4]) -> f64 {
@@ -185,7 +184,7 @@ fn quad(points: [Vector; 4]) -> f64 {
 fn polygon(points: &[Vector]) -> f64 {
     let count = points.len();
     let normal = vector_area(points);
-    let length = dot(normal, normal).sqrt();
+    let length = length(normal);
     let regular = if count == 4 { 1.0 } else { (TAU / real(count)).sin() };
     least((0..count).map(|index| {
         let (before, at, after) =

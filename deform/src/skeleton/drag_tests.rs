@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::vector::length;
 
 /// The paper's matrix `Lc Mc^-1 Lc` assembled densely with its rows replaced, solved by elimination
 /// with pivoting.
@@ -10,7 +11,7 @@ fn dense_reference(points: &[Vector], closed: bool, prescribed: &[(usize, f64)])
     let next = |node: usize| (node + 1) % count;
     let length = |node: usize| {
         let segment = subtract(points[next(node)], points[node]);
-        dot(segment, segment).sqrt()
+        length(segment)
     };
     let mut laplacian = vec![vec![0.0; count]; count];
     let mut mass = vec![1.0; count];

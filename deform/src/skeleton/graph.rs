@@ -2,7 +2,7 @@
 
 use crate::mesh::Vector;
 use crate::topology::{DisjointSets, indices};
-use crate::vector::{dot, subtract};
+use crate::vector::{dot, length, subtract};
 
 /// A curve skeleton: nodes joined into polylines, and the node that carries each vertex of a
 /// surface.
@@ -212,7 +212,7 @@ impl Skeleton {
         for (&point, &node) in points.iter().zip(&self.node_of_vertex) {
             let away = subtract(point, self.nodes[node as usize]);
             let (sum, count) = &mut sums[node as usize];
-            *sum += dot(away, away).sqrt();
+            *sum += length(away);
             *count += 1;
         }
         let mut radii: Vec<Option<f64>> =

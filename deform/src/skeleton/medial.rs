@@ -56,7 +56,7 @@ fn shrink(
         let middle = center(radius);
         let Some((nearest, _)) = tree.nearest(middle, vertex) else { break };
         let away = subtract(nearest, middle);
-        if dot(away, away).sqrt() >= radius * (1.0 - 1e-9) {
+        if length(away) >= radius * (1.0 - 1e-9) {
             break;
         }
         let chord = subtract(point, nearest);

@@ -1,7 +1,7 @@
 //! Rotations as unit quaternions.
 
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, scale};
+use crate::vector::{add, cross, dot, length, scale, unit};
 
 /// A rotation by the angle `2 atan2(|vector|, scalar)` about `vector`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,7 +26,7 @@ impl Rotation {
             return Self::IDENTITY;
         }
         let half = add(from, to);
-        let length = dot(half, half).sqrt();
+        let length = length(half);
         if length > 1e-8 {
             let half = scale(half, 1.0 / length);
             return Self { scalar: dot(from, half), vector: cross(from, half) }.normalised();
@@ -35,7 +35,7 @@ impl Rotation {
         let mut across = [0.0; 3];
         across[axis] = 1.0;
         let across = cross(from, across);
-        Self { scalar: 0.0, vector: scale(across, 1.0 / dot(across, across).sqrt()) }
+        Self { scalar: 0.0, vector: unit(across) }
     }
 
     /// This rotation after another.
@@ -167,7 +167,7 @@ pub(super) fn direction(vector: Vector) -> Option<Vector> {
         return None;
     }
     let vector = scale(vector, 1.0 / largest);
-    Some(scale(vector, 1.0 / dot(vector, vector).sqrt()))
+    Some(unit(vector))
 }
 
 /// From 0 to 1 as `x` runs from 0 to 1, level at both ends.

@@ -10,7 +10,7 @@ use crate::bounds::{Bounds, BoxTree, Boxed};
 use crate::mesh::Vector;
 use crate::parallel;
 use crate::topology::{Groups, triangles_at};
-use crate::vector::{cross, dot, subtract, triangle_normal};
+use crate::vector::{cross, dot, length, subtract, triangle_normal};
 
 /// How many flaws of each kind are named.
 const NAMED: usize = 16;
@@ -398,7 +398,7 @@ impl Shapes<'_> {
                 [self.reference, self.shape].map(|points| normal(points, corners));
             let before = cosine(was, other_was);
             if before.abs() > 0.5 {
-                let area = dot(other_was, other_was).sqrt();
+                let area = length(other_was);
                 if cosine(is, other_is) * before.signum() < -0.5 {
                     against += area;
                 } else {
@@ -416,7 +416,7 @@ fn normal(points: &[Vector], triangle: [u32; 3]) -> Vector {
 
 /// The cosine of the angle between two vectors, NaN where one has no length.
 fn cosine(a: Vector, b: Vector) -> f64 {
-    dot(a, b) / (dot(a, a).sqrt() * dot(b, b).sqrt())
+    dot(a, b) / (length(a) * length(b))
 }
 
 /// The angle in degrees between two triangles on an edge: 180 where they continue each other, 0
@@ -425,7 +425,7 @@ fn opening([start, end]: [Vector; 2], [a, b]: [Vector; 2]) -> f64 {
     let along = subtract(end, start);
     let [a, b] = [a, b].map(|third| cross(along, subtract(third, start)));
     let turn = cross(a, b);
-    dot(turn, turn).sqrt().atan2(dot(a, b)).to_degrees()
+    length(turn).atan2(dot(a, b)).to_degrees()
 }
 
 /// Whether `opening(..) < 90.0`, in a few operations.
@@ -449,8 +449,7 @@ fn longest_side(points: &[Vector], [a, b, c]: [u32; 3]) -> f64 {
 fn is_flat(points: &[Vector], triangle: [u32; 3], least: f64) -> bool {
     let longest = longest_side(points, triangle);
     let normal = normal(points, triangle);
-    let has_area = longest > least
-        && dot(normal, normal).sqrt() > FLAT * longest * longest
-        && longest.is_finite();
+    let has_area =
+        longest > least && length(normal) > FLAT * longest * longest && longest.is_finite();
     !has_area
 }

@@ -8,7 +8,7 @@ use crate::bounds::Bounds;
 use crate::features::{FaceTags, FeatureSettings, FeatureSize, Features, face_tags};
 use crate::mesh::{CellType, Cells, Mesh, MeshError, Vector, check_finite};
 use crate::topology::{DisjointSets, indices, marked, marks};
-use crate::vector::{dot, polygon_normal};
+use crate::vector::{length, polygon_normal};
 
 /// The surface of a mesh: its boundary faces, their vertices and their features.
 ///
@@ -216,7 +216,7 @@ impl Surface {
         for (triangle, &face) in self.triangles.iter().zip(&self.triangle_faces) {
             let normal = polygon_normal(&self.points, triangle);
             sizes[self.features.face_features()[face as usize] as usize].area +=
-                0.5 * dot(normal, normal).sqrt();
+                0.5 * length(normal);
         }
         sizes
     }

@@ -2,7 +2,7 @@
 
 use crate::mesh::{Cells, Vector};
 use crate::topology::edges;
-use crate::vector::{cross, dot, polygon_normal, subtract};
+use crate::vector::{cross, dot, length, polygon_normal, subtract};
 
 /// Which faces have to be turned for all to run the same way round.
 ///
@@ -51,8 +51,7 @@ pub(super) fn faces_to_turn(points: &[Vector], faces: &Cells) -> Vec<bool> {
         let [mut kept, mut changed] = [0.0, 0.0];
         for &face in &piece {
             let normal = polygon_normal(points, faces.vertices(face));
-            *if turned[face] == Some(true) { &mut changed } else { &mut kept } +=
-                dot(normal, normal).sqrt();
+            *if turned[face] == Some(true) { &mut changed } else { &mut kept } += length(normal);
         }
         for &face in &piece {
             turned[face] = Some(has_two_sides && (turned[face] == Some(true)) != (changed > kept));

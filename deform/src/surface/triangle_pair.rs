@@ -8,7 +8,7 @@
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use crate::mesh::Vector;
-use crate::vector::{cross, dot, subtract};
+use crate::vector::{cross, dot, length, subtract};
 
 type Triangle = [Vector; 3];
 
@@ -245,13 +245,13 @@ fn are_apart(a: &Triangle, b: &Triangle, margin: f64) -> bool {
 fn cones_are_apart(a: &Triangle, b: &Triangle) -> bool {
     let apex = a[0];
     let unit = |vector: Vector| {
-        let length = dot(vector, vector).sqrt();
+        let length = length(vector);
         vector.map(|value| value / length)
     };
     let [a, b] =
         [a, b].map(|triangle| [triangle[1], triangle[2]].map(|point| unit(subtract(point, apex))));
     let parts = |axis: Vector| {
-        let length = dot(axis, axis).sqrt();
+        let length = length(axis);
         let range = |pair: [Vector; 2]| {
             let [x, y] = pair.map(|direction| dot(axis, direction));
             [x.min(y), x.max(y)]

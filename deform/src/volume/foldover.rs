@@ -2,7 +2,7 @@
 
 use crate::linear::Block;
 use crate::mesh::Vector;
-use crate::vector::{add, cross, determinant, dot, scale, subtract};
+use crate::vector::{add, cross, determinant, dot, length, scale, subtract, unit};
 
 /// The weight of the term that resists a change of volume; the rest is that of the term that
 /// resists a change of shape.
@@ -174,17 +174,17 @@ pub(super) fn singular(j: &Matrix) -> (Matrix, Vector, Matrix) {
     right[2] = cross(right[0], right[1]);
     let image = |v: Vector| j.map(|row| dot(row, v));
     let first = image(right[0]);
-    let length = dot(first, first).sqrt();
-    if length.is_nan() || length <= 0.0 {
+    let size = length(first);
+    if size.is_nan() || size <= 0.0 {
         return ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3], right);
     }
-    let first = scale(first, 1.0 / length);
+    let first = scale(first, 1.0 / size);
     let second = image(right[1]);
     let second = subtract(second, scale(first, dot(first, second)));
-    let width = dot(second, second).sqrt();
-    let second = if width > 1e-14 * length { scale(second, 1.0 / width) } else { across(first) };
+    let width = length(second);
+    let second = if width > 1e-14 * size { scale(second, 1.0 / width) } else { across(first) };
     let third = cross(first, second);
-    let sigma = [length, dot(second, image(right[1])), dot(third, image(right[2]))];
+    let sigma = [size, dot(second, image(right[1])), dot(third, image(right[2]))];
     ([first, second, third], sigma, right)
 }
 
@@ -192,7 +192,7 @@ pub(super) fn singular(j: &Matrix) -> (Matrix, Vector, Matrix) {
 fn across(v: Vector) -> Vector {
     let axis = if v[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     let across = cross(v, axis);
-    scale(across, 1.0 / dot(across, across).sqrt())
+    unit(across)
 }
 
 /// The symmetric matrix with its eigenvalues raised to `floor`.

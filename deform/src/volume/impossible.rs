@@ -9,7 +9,7 @@ use crate::mesh::cell_geometry::{Scratch, centroid};
 use crate::mesh::{CellType, Domain, Vector};
 use crate::quality::Measure;
 use crate::topology::marks;
-use crate::vector::{add, cross, dot, scale, triangle_normal};
+use crate::vector::{add, cross, dot, length, scale, triangle_normal};
 
 /// Half-spaces about one vertex that are looked at: more than any mesh has but about a vertex where
 /// thousands of cells meet.
@@ -271,7 +271,7 @@ fn half_space(corner: &Corner, local: usize, points: &[Vector]) -> Option<HalfSp
     const OTHERS: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
     let face = OTHERS[local].map(|other| points[corner.vertices[other] as usize]);
     let normal = triangle_normal(face);
-    let length = dot(normal, normal).sqrt();
+    let length = length(normal);
     let normal = (length > 0.0 && length.is_finite()).then(|| scale(normal, 1.0 / length))?;
     Some(HalfSpace { normal, offset: dot(normal, face[0]), cell: corner.cell as usize })
 }
@@ -302,7 +302,7 @@ fn disjoint(halves: &[HalfSpace]) -> Option<[usize; 4]> {
                     // by as much.
                     let rest = (0..4)
                         .fold([0.0; 3], |rest, k| add(rest, scale(four[k].normal, factors[k])));
-                    let slack = ROUNDING * size * sum + size * dot(rest, rest).sqrt();
+                    let slack = ROUNDING * size * sum + size * length(rest);
                     if apart > slack {
                         return Some(four.map(|half| half.cell));
                     }

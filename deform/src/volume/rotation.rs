@@ -4,7 +4,7 @@ use super::foldover::singular;
 use crate::communicator::{Communicator, Reduction};
 use crate::mesh::Domain;
 use crate::mesh::Vector;
-use crate::vector::{add, cross, dot, scale, subtract};
+use crate::vector::{add, cross, dot, length, scale, subtract, unit};
 
 /// Rotations are gone in steps of at most this angle: a straight step of it shortens a body by a
 /// seventh half way.
@@ -86,7 +86,7 @@ impl Rigid {
 fn axis_and_angle(rotation: &[Vector; 3]) -> (Vector, f64) {
     let [a, b, c] = rotation;
     let twice = [c[1] - b[2], a[2] - c[0], b[0] - a[1]];
-    let sine = dot(twice, twice).sqrt();
+    let sine = length(twice);
     let cosine = a[0] + b[1] + c[2] - 1.0;
     let angle = sine.atan2(cosine);
     if sine > 1e-6 {
@@ -101,7 +101,7 @@ fn axis_and_angle(rotation: &[Vector; 3]) -> (Vector, f64) {
         (0..3).fold(0, |most, index| if squares[index] > squares[most] { index } else { most });
     let column: Vector =
         std::array::from_fn(|row| rotation[row][most] + if row == most { 1.0 } else { 0.0 });
-    (scale(column, 1.0 / dot(column, column).sqrt()), std::f64::consts::PI)
+    (unit(column), std::f64::consts::PI)
 }
 
 #[cfg(test)]

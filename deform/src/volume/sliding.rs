@@ -3,7 +3,7 @@
 use super::VolumeError;
 use crate::linear::{Block, SparseMatrix};
 use crate::mesh::Vector;
-use crate::vector::{dot, scale, subtract};
+use crate::vector::{dot, length, scale, subtract};
 
 /// A direction that is new is at least this far out of the plane of those known, as a sine.
 const NEW_DIRECTION: f64 = 0.1;
@@ -61,13 +61,13 @@ pub(super) fn constraints(
         let mut across = [[0.0; 3]; 3];
         for &index in group {
             let Sliding { vertex, normal } = sliding[index];
-            let length = dot(normal, normal).sqrt();
-            if !(length.is_normal() && normal.iter().all(|value| value.is_finite())) {
+            let size = length(normal);
+            if !(size.is_normal() && normal.iter().all(|value| value.is_finite())) {
                 return Err(VolumeError::SlidingNormal { vertex, normal });
             }
-            let unit = scale(normal, 1.0 / length);
+            let unit = scale(normal, 1.0 / size);
             let rest = subtract(unit, across.map(|row| dot(row, unit)));
-            let size = dot(rest, rest).sqrt();
+            let size = length(rest);
             if size > NEW_DIRECTION {
                 let direction = scale(rest, 1.0 / size);
                 for (row, a) in across.iter_mut().zip(direction) {

@@ -8,7 +8,7 @@ use tombolo_deform::communicator::{Communicator, Reader, Reduction, Writer};
 use tombolo_deform::distributed::DistributedError;
 use tombolo_deform::mesh::{CellType, Cells, Vector};
 use tombolo_deform::number::real;
-use tombolo_deform::vector::{cross, dot, length, scale, subtract};
+use tombolo_deform::vector::{cross, dot, length, scale, subtract, unit};
 
 use super::gather::{Rows, weighted};
 use super::input::Input;
@@ -253,7 +253,7 @@ fn frame(along: Vector) -> [Vector; 3] {
     let mut aside = [0.0; 3];
     aside[shortest] = 1.0;
     let aside = subtract(aside, scale(first, dot(aside, first)));
-    let second = scale(aside, 1.0 / length(aside));
+    let second = unit(aside);
     [first, second, cross(first, second)]
 }
 

@@ -3,7 +3,7 @@
 use tombolo_deform::bounds::Bounds;
 use tombolo_deform::edit::BoxRegion;
 use tombolo_deform::mesh::Vector;
-use tombolo_deform::vector::{cross, dot, length, scale, subtract};
+use tombolo_deform::vector::{cross, dot, length, scale, subtract, unit};
 
 use super::angle::sine_and_cosine;
 use crate::language::{Camera, Viewpoint};
@@ -210,7 +210,7 @@ fn normalized(vector: Vector) -> Vector {
     // First by the largest component, so that no square is too large or small for a number.
     let largest = vector.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let scaled = vector.map(|x| x / largest);
-    scale(scaled, 1.0 / length(scaled))
+    unit(scaled)
 }
 
 fn corners(bounds: &Bounds) -> [Vector; 8] {
