@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use fastrand::Rng;
-use serde_json::{Value, json};
+use serde_json::json;
 use tombolo_tests::{PATIENCE, Run, Small, Viewer, pinch};
 
 /// Orders that overlap, are refused and are undone, and one that a pipeline gives.
