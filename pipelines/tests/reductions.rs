@@ -261,7 +261,6 @@ fn shear_is_that_of_couette_and_poiseuille() {
     let poiseuille = Case::steady(|_, _| 0.0, |[_, _, z], _| [4.0 * z * (1.0 - z), 0.0, 0.0]);
     let error = |cells: usize| {
         let mesh = plain(&box_of_tets([2, 2, cells], [0.0; 3], UPPER));
-        let count = mesh.cells().len();
         let whole = Part::whole(&mesh).unwrap();
         let made = poiseuille.made(&stages("0.25"), &whole, Arc::new(Solo));
         is_near(made.monitors["stress.mean.x"] * 2.0, 2.0 * made.monitors["bottom.x"], "both ways");

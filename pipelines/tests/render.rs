@@ -336,7 +336,7 @@ fn ghosts_are_not_drawn() {
     };
     let drawn = |bits: u8| {
         let ghosts = (0..mesh.cells().len()).map(|cell| if is_last(cell) { bits } else { 0 });
-        let part = Part { ghosts: Some(ghosts.collect()), ..whole(&mesh) };
+        let part = Part { ghosts: Some(ghosts.collect()), ..Part::whole(&mesh).unwrap() };
         let made =
             made(&format!(r#"{{"name": "a", "stages": [{stages}]}}"#), &part, Arc::new(Solo));
         assert!(made.errors.is_empty(), "{:?}", made.errors);
