@@ -99,41 +99,22 @@ pub trait Communicator: std::fmt::Debug + Send + Sync {
     /// Combines each number over all ranks, which bring as many of them; every rank has the result,
     /// to the same bits.
     fn reduce(&self, reduction: Reduction, values: &mut [f64]) {
-        if self.size() == 1 {
-            return;
-        }
-        let mut bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        self.combine(&mut bytes, &|mine, more| {
-            for (mine, more) in mine.as_chunks_mut().0.iter_mut().zip(more.as_chunks().0) {
-                *mine = reduction
-                    .of_numbers(f64::from_le_bytes(*mine), f64::from_le_bytes(*more))
-                    .to_le_bytes();
-            }
-        });
-        values
-            .iter_mut()
-            .zip(bytes.as_chunks().0)
-            .for_each(|(value, bytes)| *value = f64::from_le_bytes(*bytes));
+        let join = |a, b| reduction.of_numbers(a, b);
+        join_values(self, values, f64::to_le_bytes, f64::from_le_bytes, &join);
+    }
+
+    /// The combination of the ranks' numbers, on every rank to the same bits.
+    fn reduced(&self, reduction: Reduction, mine: f64) -> f64 {
+        let mut values = [mine];
+        self.reduce(reduction, &mut values);
+        values[0]
     }
 
     /// Combines each integer over all ranks, which bring as many of them; every rank has the
     /// result. Sums end at the largest integer.
     fn reduce_integers(&self, reduction: Reduction, values: &mut [u64]) {
-        if self.size() == 1 {
-            return;
-        }
-        let mut bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        self.combine(&mut bytes, &|mine, more| {
-            for (mine, more) in mine.as_chunks_mut().0.iter_mut().zip(more.as_chunks().0) {
-                *mine = reduction
-                    .of_integers(u64::from_le_bytes(*mine), u64::from_le_bytes(*more))
-                    .to_le_bytes();
-            }
-        });
-        values
-            .iter_mut()
-            .zip(bytes.as_chunks().0)
-            .for_each(|(value, bytes)| *value = u64::from_le_bytes(*bytes));
+        let join = |a, b| reduction.of_integers(a, b);
+        join_values(self, values, u64::to_le_bytes, u64::from_le_bytes, &join);
     }
 
     /// Widens ranges, each its least and its largest number, to those of all ranks. One from infinity
@@ -187,6 +168,27 @@ pub trait Communicator: std::fmt::Debug + Send + Sync {
         let mut reader = Reader::new(0, &packed);
         (0..self.size()).map(|_| reader.bytes().map(<[u8]>::to_vec).unwrap_or_default()).collect()
     }
+}
+
+/// Joins each value with those of the other ranks, on the way as bytes.
+fn join_values<C: Communicator + ?Sized, T: Copy>(
+    communicator: &C,
+    values: &mut [T],
+    to_bytes: fn(T) -> [u8; 8],
+    from_bytes: fn([u8; 8]) -> T,
+    join: &dyn Fn(T, T) -> T,
+) {
+    if communicator.size() == 1 {
+        return;
+    }
+    let mut bytes = values.iter().flat_map(|&value| to_bytes(value)).collect();
+    communicator.combine(&mut bytes, &|mine, more| {
+        for (mine, more) in mine.as_chunks_mut().0.iter_mut().zip(more.as_chunks().0) {
+            *mine = to_bytes(join(from_bytes(*mine), from_bytes(*more)));
+        }
+    });
+    let joined = bytes.as_chunks().0.iter().copied().map(from_bytes);
+    values.iter_mut().zip(joined).for_each(|(value, joined)| *value = joined);
 }
 
 fn integer<C: Communicator + ?Sized>(communicator: &C, reduction: Reduction, mine: usize) -> usize {

@@ -150,7 +150,7 @@ impl Newton {
             let off = subtract(points[vertex as usize], position);
             0.5 * weight * dot(off, off)
         });
-        sum(self.halo.communicator(), mine.sum())
+        self.halo.communicator().reduced(Reduction::Sum, mine.sum())
     }
 
     /// Goes a step of Newton's method down, over `allowed` shapes alone; `None` where there is
@@ -200,7 +200,7 @@ impl Newton {
             solver.solve(&right_side, &mut direction, Tolerance { relative, absolute: 0.0 })
         });
         // The right side is the sum of the ranks', the direction the same on all.
-        let slope = -sum(ranks, inner(&right_side, &direction));
+        let slope = -ranks.reduced(Reduction::Sum, inner(&right_side, &direction));
         // Conjugate gradients that were stopped early lead downwards too.
         let solved = matches!(solved, Ok(_) | Err(LinearError::NotConverged { .. }));
         ranks.all(solved && slope < 0.0 && slope.is_finite()).then_some((direction, slope))
@@ -235,7 +235,7 @@ impl Newton {
                 .sum::<f64>()
         });
         let mine = of_corners.into_iter().sum();
-        sum(self.halo.communicator(), mine)
+        self.halo.communicator().reduced(Reduction::Sum, mine)
             + energy.pull.map_or(0.0, |pull| self.pulled(points, pull))
     }
 
@@ -247,9 +247,8 @@ impl Newton {
                 .map(|corner| foldover::determinant_of(&corner.jacobian(points)));
             determinants.fold(f64::INFINITY, f64::min)
         });
-        let mut least = [least.into_iter().fold(f64::INFINITY, f64::min)];
-        self.halo.communicator().reduce(Reduction::Minimum, &mut least);
-        least[0]
+        let least = least.into_iter().fold(f64::INFINITY, f64::min);
+        self.halo.communicator().reduced(Reduction::Minimum, least)
     }
 
     /// The Hessian, and the energy's gradient with its sign turned.
@@ -309,12 +308,6 @@ impl Newton {
         }
         (matrix, right_side)
     }
-}
-
-pub(super) fn sum(communicator: &dyn Communicator, mine: f64) -> f64 {
-    let mut sum = [mine];
-    communicator.reduce(Reduction::Sum, &mut sum);
-    sum[0]
 }
 
 fn inner(a: &[Vector], b: &[Vector]) -> f64 {

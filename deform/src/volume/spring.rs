@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::foldover;
-use super::newton::{Energy, Pull, sum};
+use super::newton::{Energy, Pull};
 use super::rotation::Rigid;
 use super::route::Volume;
 use super::untangle::Untangler;
-use crate::communicator::Communicator;
+use crate::communicator::{Communicator, Reduction};
 use crate::mesh::Vector;
 use crate::number::real;
 
@@ -100,7 +100,8 @@ impl Untangler {
         }
         let mut points = points.to_vec();
         let mut near = self.numbering.gather(&points).into_owned();
-        let rest = foldover::REST * sum(self.domain.communicator(), real(self.corners.len()));
+        let rest = foldover::REST
+            * self.domain.communicator().reduced(Reduction::Sum, real(self.corners.len()));
         let stiffnesses = self.newton.stiffnesses(&self.corners);
         let mut stiffness = FIRST_PULL;
         for _ in 0..STEPS {

@@ -128,10 +128,10 @@ impl Share {
         let shape = quality(&self.own, points);
         let (cells, inverted) =
             (communicator.total(self.own.len()), communicator.total(shape.inverted));
-        let mut least = [if self.own.is_empty() { f64::INFINITY } else { shape.min }];
-        communicator.reduce(Reduction::Minimum, &mut least);
+        let least = if self.own.is_empty() { f64::INFINITY } else { shape.min };
+        let least = communicator.reduced(Reduction::Minimum, least);
         let vertices = usize::try_from(self.shared.count()).unwrap_or(usize::MAX);
-        MeshReport { vertices, cells, inverted, min_scaled_jacobian: least[0] }
+        MeshReport { vertices, cells, inverted, min_scaled_jacobian: least }
     }
 
     /// Brings what the ranks have at their vertices together on rank 0, where it takes the place of

@@ -9,14 +9,6 @@ pub fn total<const N: usize>(communicator: &dyn Communicator, mut values: [f64; 
     values
 }
 
-/// The largest over all ranks. Collective.
-#[must_use]
-pub fn largest(communicator: &dyn Communicator, value: f64) -> f64 {
-    let mut values = [value];
-    communicator.reduce(Reduction::Maximum, &mut values);
-    values[0]
-}
-
 /// Goes on where all ranks can; elsewhere all have the error of the lowest that cannot. Collective.
 ///
 /// # Errors

@@ -51,8 +51,7 @@ pub(super) fn pattern(
     };
     let along: Vec<Vector> = places.iter().map(|(_, found)| vector(found)).collect();
     let own = along.iter().map(|vector| length(*vector)).filter(|size| size.is_finite());
-    let mut largest = [own.fold(0.0, f64::max)];
-    communicator.reduce(Reduction::Maximum, &mut largest);
+    let largest = communicator.reduced(Reduction::Maximum, own.fold(0.0, f64::max));
     let size = stage.size.unwrap_or(0.05 * bounds.diagonal());
     let body = match stage.shape {
         GlyphShape::Arrow => arrow(),
@@ -67,8 +66,8 @@ pub(super) fn pattern(
         if magnitude.is_nan() || magnitude == 0.0 && stage.shape == GlyphShape::Arrow {
             continue;
         }
-        let is_scaled = stage.scaled && vectors.is_some() && largest[0] > 0.0;
-        let size = if is_scaled { size * magnitude / largest[0] } else { size };
+        let is_scaled = stage.scaled && vectors.is_some() && largest > 0.0;
+        let size = if is_scaled { size * magnitude / largest } else { size };
         let frame = frame(along);
         #[expect(clippy::cast_possible_truncation, reason = "a limited number of glyphs")]
         let first = points.len() as u32;

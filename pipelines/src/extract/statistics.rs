@@ -46,9 +46,8 @@ pub fn statistics(
             scale = scale.max(value.abs());
         }
     }
-    let mut widest = [scale];
-    communicator.reduce(Reduction::Maximum, &mut widest);
-    let scale = if widest[0] > 0.0 { widest[0] } else { 1.0 };
+    let widest = communicator.reduced(Reduction::Maximum, scale);
+    let scale = if widest > 0.0 { widest } else { 1.0 };
     for start in (0..values.len()).step_by(CHUNK) {
         let (mut part_sum, mut part_squares) = (0.0, 0.0);
         for tuple in (start..values.len().min(start + CHUNK)).filter(|&tuple| counts(tuple)) {

@@ -390,13 +390,13 @@ pub(super) fn pattern(
     let points = &source.positions.points;
     let bounds = Bounds::around(points.iter().copied()).of_ranks(communicator);
     let speeds = vectors.iter().map(|vector| length(*vector));
-    let mut fastest = [speeds.filter(|speed| speed.is_finite()).fold(0.0, f64::max)];
-    communicator.reduce(Reduction::Maximum, &mut fastest);
+    let fastest = speeds.filter(|speed| speed.is_finite()).fold(0.0, f64::max);
+    let fastest = communicator.reduced(Reduction::Maximum, fastest);
     let settings = Settings {
         max_length: stage.max_length.unwrap_or(5.0 * bounds.diagonal()),
         max_steps: u32::try_from(stage.max_steps).unwrap_or(u32::MAX),
         error: stage.error,
-        least_speed: 1e-12 * fastest[0],
+        least_speed: 1e-12 * fastest,
         points: limit,
     };
     let finder = Finder::kept(source);

@@ -82,10 +82,10 @@ impl Improver {
             let ranks = held.halo().communicator();
             // The reduction passes over NaN.
             let least = if found.least.is_nan() { f64::NEG_INFINITY } else { found.least };
-            let (mut least, mut sums) = ([least], [found.sum, found.worn]);
-            ranks.reduce(Reduction::Minimum, &mut least);
+            let least = ranks.reduced(Reduction::Minimum, least);
+            let mut sums = [found.sum, found.worn];
             ranks.reduce(Reduction::Sum, &mut sums);
-            found = Qualities { least: least[0], sum: sums[0], worn: sums[1] };
+            found = Qualities { least, sum: sums[0], worn: sums[1] };
         }
         found
     }
@@ -94,10 +94,12 @@ impl Improver {
     /// gain. Collective.
     pub(super) fn least_fixed(&self, points: &[Vector]) -> f64 {
         let quality = |&simplex: &u32| self.simplices[simplex as usize].least(points);
-        let mut least = [self.fixed.iter().map(quality).fold(f64::INFINITY, f64::min)];
-        if let Some(Interface { held, .. }) = &self.interface {
-            held.halo().communicator().reduce(Reduction::Minimum, &mut least);
+        let least = self.fixed.iter().map(quality).fold(f64::INFINITY, f64::min);
+        match &self.interface {
+            Some(Interface { held, .. }) => {
+                held.halo().communicator().reduced(Reduction::Minimum, least)
+            }
+            None => least,
         }
-        least[0]
     }
 }

@@ -1,5 +1,6 @@
 //! What can be read off a flow: its fields, and what they come to over the mesh and its boundary.
 
+use tombolo_deform::communicator::Reduction;
 use tombolo_deform::mesh::Vector;
 use tombolo_deform::vector::dot;
 
@@ -8,7 +9,7 @@ use crate::boundary::{Condition, Patch};
 use crate::fluid::Fluid;
 use crate::geometry::Element;
 use crate::linear::sum;
-use crate::ranks::{largest, total};
+use crate::ranks::total;
 
 impl Solver {
     pub(super) fn imbalance(&self) -> f64 {
@@ -110,7 +111,7 @@ impl Solver {
             .map(|&velocity| dot(velocity, velocity))
             .fold(0.0, f64::max)
             .sqrt();
-        largest(self.halo.communicator(), fastest)
+        self.halo.communicator().reduced(Reduction::Maximum, fastest)
     }
 
     /// The largest Courant number of any element for a time step: how many elements the fluid
@@ -128,6 +129,7 @@ impl Solver {
                 * element.gradients.iter().map(|&gradient| dot(mean, gradient).abs()).sum::<f64>()
         };
         let elements = self.topology.elements.iter().zip(&self.geometry.elements);
-        largest(self.halo.communicator(), elements.map(across).fold(0.0, f64::max))
+        let largest = elements.map(across).fold(0.0, f64::max);
+        self.halo.communicator().reduced(Reduction::Maximum, largest)
     }
 }
