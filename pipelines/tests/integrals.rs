@@ -282,7 +282,7 @@ fn hidden_cells_and_what_is_not_finite_do_not_count() {
     };
     let bit = |cell: usize| if middle(cell) > 1.5 { ghosts::HIDDEN } else { 0 };
     let bits: Vec<u8> = (0..mesh.cells().len()).map(bit).collect();
-    let part = Part { ghosts: Some(bits), ..whole(&mesh) };
+    let part = Part { ghosts: Some(bits), ..Part::whole(&mesh).unwrap() };
     let (values, messages) = found(REGIONS, &part, Arc::new(Solo), |[x, ..]| x, |point| point);
     assert!(messages.is_empty(), "{messages:?}");
     is_near(values["whole.size"], 1.5, "whole");
