@@ -30,7 +30,7 @@ pub const BOX_FEATURES: [&str; 6] = ["x-min", "x-max", "y-min", "y-max", "z-min"
 pub fn box_of_tets(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     let grid = Grid::new(counts);
     let mut connectivity = Vec::with_capacity(24 * grid.cell_count());
-    grid.for_each_cell(|corner| {
+    grid.for_each_cell(|_, corner| {
         for ([a, b, c], even) in [
             ([0, 1, 2], true),
             ([1, 2, 0], true),
@@ -67,7 +67,7 @@ pub fn box_of_tets(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
 pub fn box_of_hexahedra(counts: [usize; 3], lower: Vector, upper: Vector) -> Mesh {
     let grid = Grid::new(counts);
     let mut connectivity = Vec::with_capacity(8 * grid.cell_count());
-    grid.for_each_cell(|corner| connectivity.extend([0, 1, 3, 2, 4, 5, 7, 6].map(corner)));
+    grid.for_each_cell(|_, corner| connectivity.extend([0, 1, 3, 2, 4, 5, 7, 6].map(corner)));
     let mut faces = Cells::new();
     let mut tags = Vec::new();
     grid.for_each_boundary_quad(|tag, quad| {
@@ -96,13 +96,8 @@ pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> M
     let kind = |i: usize, j: usize| (i + 2 * j) % 3;
     let mut points = grid.points(lower, upper);
     let mut cells = Cells::new();
-    let [columns, rows, layers] = grid.counts;
-    for (k, j, i) in
-        (0..layers).flat_map(|k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i))))
-    {
-        let corner = |corner: usize| {
-            grid.vertex([i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2 & 1)])
-        };
+    let [columns, rows, _] = grid.counts;
+    grid.for_each_cell(|[i, j, k], corner| {
         let mut push =
             |cell_type: CellType, vertices: &[u32]| valid(cells.push(cell_type, vertices));
         match (kind(i, j), k % 2) {
@@ -124,7 +119,7 @@ pub fn box_of_mixed_cells(counts: [usize; 3], lower: Vector, upper: Vector) -> M
                 }
             }
         }
-    }
+    });
     let mut faces = Cells::new();
     let mut tags = Vec::new();
     grid.for_each_boundary_quad(|tag, [a, b, c, d]| {
@@ -165,15 +160,9 @@ pub fn torus(major: f64, minor: f64, counts: [usize; 2]) -> Mesh {
         }
     }
     let vertex = |i: usize, j: usize| number((j % about) + about * (i % around));
-    let mut connectivity = Vec::with_capacity(6 * points.len());
-    for i in 0..around {
-        for j in 0..about {
-            let [a, b, c, d] =
-                [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
-            connectivity.extend([a, b, c, a, c, d]);
-        }
-    }
-    let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
+    let cells = split_squares([around, about], |i, j| {
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+    });
     valid(Mesh::new(points, cells, FeatureSource::Vertices(tags.into())))
 }
 
@@ -203,16 +192,10 @@ pub fn tube(axis: &[Vector], radius: f64, around: usize) -> Mesh {
                 .push(add(center, add(scale(across, radius * cosine), scale(side, radius * sine))));
         }
     }
-    let mut connectivity = Vec::with_capacity(6 * points.len());
-    for i in 1..axis.len() {
-        for j in 0..around {
-            let vertex = |i: usize, j: usize| number(j % around + around * i);
-            let [a, b, c, d] =
-                [vertex(i - 1, j), vertex(i - 1, j + 1), vertex(i, j + 1), vertex(i, j)];
-            connectivity.extend([a, b, c, a, c, d]);
-        }
-    }
-    let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
+    let vertex = |i: usize, j: usize| number(j % around + around * i);
+    let cells = split_squares([axis.len().saturating_sub(1), around], |i, j| {
+        [vertex(i, j), vertex(i, j + 1), vertex(i + 1, j + 1), vertex(i + 1, j)]
+    });
     valid(Mesh::new(points, cells, FeatureSource::SharpEdges))
 }
 
@@ -234,17 +217,24 @@ pub fn plate(counts: [usize; 2], lower: [f64; 2], upper: [f64; 2]) -> Mesh {
             ]);
         }
     }
-    let mut connectivity = Vec::with_capacity(6 * columns * rows);
-    for j in 0..rows {
-        for i in 0..columns {
-            let vertex = |i: usize, j: usize| number(i + (columns + 1) * j);
-            let [a, b, c, d] =
-                [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
+    let vertex = |i: usize, j: usize| number(i + (columns + 1) * j);
+    let cells = split_squares([rows, columns], |j, i| {
+        [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)]
+    });
+    valid(Mesh::new(points, cells, FeatureSource::SharpEdges))
+}
+
+/// Two triangles for each square, which has its corners in turn: on the diagonal from the first to
+/// the third.
+fn split_squares([rows, columns]: [usize; 2], corners: impl Fn(usize, usize) -> [u32; 4]) -> Cells {
+    let mut connectivity = Vec::with_capacity(6 * rows * columns);
+    for row in 0..rows {
+        for column in 0..columns {
+            let [a, b, c, d] = corners(row, column);
             connectivity.extend([a, b, c, a, c, d]);
         }
     }
-    let cells = valid(Cells::uniform(CellType::Triangle, connectivity));
-    valid(Mesh::new(points, cells, FeatureSource::SharpEdges))
+    valid(Cells::uniform(CellType::Triangle, connectivity))
 }
 
 /// One cell of a type, right-handed and of unit size: each kind of cell spans a unit square or cube
@@ -344,13 +334,13 @@ impl Grid {
         points
     }
 
-    /// Calls `visit` with each cell's corners: bit 0 of a corner's number stands for x, bit 1 for
+    /// Calls `visit` with each cell's place in the grid and its corners: bit 0 of a corner's number stands for x, bit 1 for
     /// y, bit 2 for z.
-    fn for_each_cell(&self, mut visit: impl FnMut(&dyn Fn(usize) -> u32)) {
+    fn for_each_cell(&self, mut visit: impl FnMut([usize; 3], &dyn Fn(usize) -> u32)) {
         for k in 0..self.counts[2] {
             for j in 0..self.counts[1] {
                 for i in 0..self.counts[0] {
-                    visit(&|corner| {
+                    visit([i, j, k], &|corner| {
                         self.vertex([
                             i + (corner & 1),
                             j + (corner >> 1 & 1),
