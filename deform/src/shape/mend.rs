@@ -12,7 +12,8 @@ use crate::{
 
 use super::body::Body;
 use super::carry::Carrier;
-use super::plan::{CurrentShape, Plan, travel};
+use super::plan::{CurrentShape, Plan};
+use super::travel::travel;
 use super::{
     Deformation, Phase, Refused, Request, ShapeSeconds, Shaper, Target, check_stack, displaced,
     moved,

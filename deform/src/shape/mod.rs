@@ -11,6 +11,7 @@ mod refused;
 mod request;
 mod saved;
 mod surface_only;
+mod travel;
 // Ranks are threads, which WebAssembly does not have.
 #[cfg(all(test, not(target_family = "wasm")))]
 mod cancelled;

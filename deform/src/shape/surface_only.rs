@@ -8,7 +8,8 @@ use crate::{
     schedule::Schedule,
 };
 
-use super::plan::{CurrentShape, Plan, of_surface};
+use super::plan::{CurrentShape, Plan};
+use super::travel::of_surface;
 use super::{Refused, ShapeSeconds, Shaper, Target, moved};
 
 impl Shaper {
