@@ -10,7 +10,7 @@ use std::{
     fs::File,
     io::{Read, Seek},
     process::Child,
-    time::{Duration, Instant, SystemTime},
+    time::{Duration, Instant},
 };
 
 use serde::Serialize;
@@ -36,11 +36,9 @@ use crate::{
     overhead::{LARGE, SMALL, TIME_STEP, channel, solver},
     peer,
     report::{Line, Report, Target},
-    service_viewers::{Seen, Task},
+    service_viewers::{EVERY, Seen, Task, now},
 };
 
-/// Steps between two frames of a view.
-pub const EVERY: u64 = 5;
 /// What docs/operations.md lets commands, the stack, the views and the viewers take, in MiB, as far as
 /// this run can fill it: commands that wait four times over, the stack, and what the viewers have
 /// not read.
@@ -334,11 +332,6 @@ impl Drop for Viewers {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
-}
-
-/// Seconds since the epoch, the clock that both processes have.
-pub fn now() -> f64 {
-    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 /// The median and the 95th percentile.

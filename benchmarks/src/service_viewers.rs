@@ -8,7 +8,7 @@ use std::{
     net::TcpStream,
     num::NonZeroU32,
     sync::mpsc,
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 use serde::{Deserialize, Serialize};
@@ -23,8 +23,8 @@ use tombolo::{
     },
 };
 
-use crate::service::now;
-
+/// Steps between two frames of a view.
+pub const EVERY: u64 = 5;
 /// Bytes a second of a slow viewer, and the pieces in which it reads them.
 const SLOW: usize = 10_000;
 const PIECE: usize = 1_000;
@@ -32,6 +32,11 @@ const PIECE: usize = 1_000;
 const UNDER_WAY: usize = 16;
 /// How long anything is waited for.
 const PATIENCE: Duration = Duration::from_secs(600);
+
+/// Seconds since the epoch, the clock that both processes have.
+pub fn now() -> f64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs_f64()
+}
 
 /// What the viewers do.
 #[derive(Debug, Serialize, Deserialize)]
@@ -190,7 +195,7 @@ fn watch(link: &str, [fast, slow, deaf]: [usize; 3], seconds: f64) -> Result<See
                 })?;
                 let cycles = last.saturating_sub(first.unwrap_or(last));
                 // Two views.
-                let made = 2 * (cycles / super::service::EVERY);
+                let made = 2 * (cycles / EVERY);
                 let _ = parts.send((counted as f64 / made.max(1) as f64).min(1.0));
                 Ok::<(), Box<dyn Error + Send + Sync>>(())
             }));
