@@ -9,7 +9,7 @@ pub(super) const MOST_STEPS: f64 = 268_435_456.0;
 
 /// The result of a walk, with points numbered in the order of the walk.
 pub(super) struct Walked {
-    pub(super) places: Vec<[i32; 3]>,
+    pub(super) positions: Vec<[i32; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) features: Vec<u32>,
     pub(super) lines: Vec<[u32; 2]>,
@@ -31,8 +31,8 @@ struct Models {
 pub(super) trait Source {
     fn seed(&mut self, fresh: u32) -> Option<[u32; 3]>;
     fn behind(&mut self, gate: [u32; 2]) -> Third;
-    /// The place of a point that was met.
-    fn place(&mut self, point: u32) -> [i32; 3];
+    /// The position of a point that was met.
+    fn position(&mut self, point: u32) -> [i32; 3];
     /// Takes note of the triangle that was last asked for, and says its feature.
     fn feature(&mut self) -> Option<u32>;
     /// The ends of a line.
@@ -54,10 +54,10 @@ impl<S: Source> Coding<'_, S> {
         point: u32,
         across: Option<Across>,
     ) -> Result<(), CodecError> {
-        let place = self.source.place(point);
-        let places = &mut self.walked.places;
+        let position = self.source.position(point);
+        let positions = &mut self.walked.positions;
         let near = across.map_or([0; 3], |Across { ends: [x, y], opposite }| {
-            let at = |point: u32| places[point as usize].map(i64::from);
+            let at = |point: u32| positions[point as usize].map(i64::from);
             let (x, y, opposite) = (at(x), at(y), at(opposite));
             std::array::from_fn(|axis| x[axis] + y[axis] - opposite[axis])
         });
@@ -65,14 +65,14 @@ impl<S: Source> Coding<'_, S> {
         let models = &mut self.walked.models.axes[usize::from(is_opposite)];
         let mut coded = [0; 3];
         for axis in 0..3 {
-            let difference = i64::from(place[axis]) - near[axis];
+            let difference = i64::from(position[axis]) - near[axis];
             let difference = bits.signed(&mut models[axis], difference)?;
             let steps = near[axis].wrapping_add(difference);
             let steps = i32::try_from(steps).ok();
             let steps = steps.filter(|steps| f64::from(*steps).abs() <= MOST_STEPS);
             coded[axis] = steps.ok_or(CodecError::Positions)?;
         }
-        places.push(coded);
+        positions.push(coded);
         Ok(())
     }
 }
@@ -140,7 +140,7 @@ pub(super) fn code<B: Bits, S: Source>(
         end: Number::NEW,
     };
     let walked = Walked {
-        places: Vec::new(),
+        positions: Vec::new(),
         triangles: Vec::new(),
         features: Vec::new(),
         lines: Vec::new(),
@@ -208,7 +208,7 @@ impl Source for Unknown {
         Third::Nothing
     }
 
-    fn place(&mut self, _: u32) -> [i32; 3] {
+    fn position(&mut self, _: u32) -> [i32; 3] {
         [0; 3]
     }
 

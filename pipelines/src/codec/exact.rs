@@ -49,7 +49,7 @@ pub(super) fn precision(values: &[f64]) -> Precision {
     if values.iter().all(is_single) { Precision::Single } else { Precision::Double }
 }
 
-/// Codes one component, place after place. `last` are its values in the last frame.
+/// Codes one component, index after index. `last` are its values in the last frame.
 fn code<B: Bits>(
     bits: &mut B,
     stencils: &[Stencil],
@@ -64,9 +64,9 @@ fn code<B: Bits>(
             Some(last) => last[point],
             None => {
                 let mut sum = 0.0;
-                for (&place, &weight) in stencil.places.iter().zip(&stencil.weights) {
+                for (&index, &weight) in stencil.indices.iter().zip(&stencil.weights) {
                     if weight != 0.0 {
-                        sum += f64::from(weight) * values[place as usize];
+                        sum += f64::from(weight) * values[index as usize];
                     }
                 }
                 sum
@@ -74,7 +74,7 @@ fn code<B: Bits>(
         };
         let near = ordered(if near.is_finite() { near } else { 0.0 }, precision);
         let difference = ordered(values[point], precision).wrapping_sub(near);
-        let context = usize::from(lengths[stencil.places[0] as usize]).div_ceil(8);
+        let context = usize::from(lengths[stencil.indices[0] as usize]).div_ceil(8);
         let difference = bits.signed(&mut models[context], difference)?;
         #[expect(clippy::cast_possible_truncation, reason = "at most 64")]
         {

@@ -49,8 +49,8 @@ const NEARLY_TWICE: f64 = 2.0 * (1.0 - 1e-9);
 ///
 /// let copy = Topology::decode(&coded.message)?;
 /// let decoded = Field::new(1).decode(copy.points(), &mut &message[..])?;
-/// for (place, value) in decoded.iter().enumerate() {
-///     let sent = values[coded.points[place] as usize];
+/// for (index, value) in decoded.iter().enumerate() {
+///     let sent = values[coded.points[index] as usize];
 ///     assert!((value - sent).abs() <= 0.01 || value.is_nan() && sent.is_nan());
 /// }
 /// # Ok::<(), tombolo_pipelines::codec::CodecError>(())
@@ -90,7 +90,7 @@ impl Field {
     }
 
     /// Codes the next frame and appends it to a message. `order` says which tuple of `values` stands
-    /// at each place of the hierarchy.
+    /// at each index of the hierarchy.
     ///
     /// # Errors
     /// [`CodecError::Length`] where the values or the order do not fit the hierarchy.
@@ -159,7 +159,7 @@ impl Field {
                 .collect());
         };
         let mut shown = grid.values();
-        exceptions.into_iter().for_each(|(place, value)| shown[place] = value);
+        exceptions.into_iter().for_each(|(index, value)| shown[index] = value);
         Ok(shown)
     }
 
@@ -269,7 +269,7 @@ impl Field {
             let around = Around { hierarchy, mask, beside, step, follows };
             let wanted = wanted(ordered, grid.offsets[component]);
             let beyond = plane[0].encode(around, wanted, message);
-            let exception = |place| (place * components + component, ordered[place]);
+            let exception = |index| (index * components + component, ordered[index]);
             exceptions.extend(beyond.into_iter().map(exception));
         }
         if !exceptions.is_empty() {
@@ -365,7 +365,7 @@ impl Field {
                 });
                 let planes: Vec<Vec<f64>> = planes.collect::<Result<_, _>>()?;
                 let tuples = (0..hierarchy.len())
-                    .flat_map(|place| planes.iter().map(move |plane| plane[place]));
+                    .flat_map(|index| planes.iter().map(move |plane| plane[index]));
                 let values = tuples.collect();
                 self.known = Known::Exact(precision, planes);
                 Ok(values)
@@ -427,7 +427,7 @@ impl Field {
     }
 }
 
-/// Puts the values place after place, one component after the other.
+/// Puts the values index after index, one component after the other.
 fn put_in_order(values: &[f64], components: usize, order: &[u32], ordered: &mut Vec<f64>) {
     ordered.resize(values.len(), 0.0);
     match components {
@@ -445,41 +445,41 @@ fn put_in_order(values: &[f64], components: usize, order: &[u32], ordered: &mut 
     }
 }
 
-/// The values of tuples of so many, place after place, one component after the other; each is looked
+/// The values of tuples of so many, index after index, one component after the other; each is looked
 /// up once.
 fn put_in_order_of<const COMPONENTS: usize>(values: &[f64], order: &[u32], ordered: &mut [f64]) {
     let mut lists = ordered.chunks_exact_mut(order.len().max(1));
     let mut lists: [&mut [f64]; COMPONENTS] =
         std::array::from_fn(|_| lists.next().unwrap_or_default());
     let tuples = values.as_chunks::<COMPONENTS>().0;
-    for (place, &at) in order.iter().enumerate() {
+    for (index, &at) in order.iter().enumerate() {
         let tuple = tuples[at as usize];
-        lists.iter_mut().zip(tuple).for_each(|(list, value)| list[place] = value);
+        lists.iter_mut().zip(tuple).for_each(|(list, value)| list[index] = value);
     }
 }
 
 const NOT_KNOWN: CodecError = CodecError::Damaged("the frame goes on from one that is not known");
 
-/// Values by their place, the lowest first: each as how many lie between it and the one before.
+/// Values by their index, the lowest first: each as how many lie between it and the one before.
 fn put_exceptions(exceptions: &mut [(usize, f64)], message: &mut Vec<u8>) {
     exceptions.sort_unstable_by_key(|exception| exception.0);
     put_count(message, exceptions.len());
     let mut next = 0;
-    for &mut (place, value) in exceptions {
-        put_count(message, place - next);
+    for &mut (index, value) in exceptions {
+        put_count(message, index - next);
         message.extend(value.to_le_bytes());
-        next = place + 1;
+        next = index + 1;
     }
 }
 
 fn take_exceptions(values: &mut [f64], input: &mut Input<'_>) -> Result<(), CodecError> {
     let mut next = 0usize;
     for _ in 0..input.count()? {
-        let place = next.saturating_add(input.count()?);
+        let index = next.saturating_add(input.count()?);
         let value = input.double()?;
-        let there = values.get_mut(place);
+        let there = values.get_mut(index);
         *there.ok_or(CodecError::Damaged("a value stands beyond the last"))? = value;
-        next = place + 1;
+        next = index + 1;
     }
     Ok(())
 }

@@ -44,12 +44,12 @@ impl Grid {
     /// Gives points with a mask the value that is next to theirs in the grid.
     pub(super) fn set_masked(&mut self) {
         let per_unit = two_to(-i32::from(self.exponent));
-        for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
+        for (index, tuple) in self.mask.iter().flat_map(Mask::tuples) {
             for (component, plane) in self.planes.iter_mut().enumerate() {
                 let value = (tuple[component] - self.offsets[component]) * per_unit;
                 let is_near = value.abs() <= 2.0 * MOST_STEPS;
                 let now = if is_near { value.round_ties_even() as f32 } else { 0.0 };
-                plane.nodes[place].set(0.0, now);
+                plane.nodes[index].set(0.0, now);
             }
         }
     }
@@ -61,8 +61,8 @@ impl Grid {
         let mut values = vec![0.0; points.map_or(0, |plane| plane.nodes.len()) * components];
         for (component, plane) in self.planes.iter().enumerate() {
             let offset = self.offsets[component];
-            let places = values.iter_mut().skip(component).step_by(components);
-            for (value, node) in places.zip(&plane.nodes) {
+            let of_points = values.iter_mut().skip(component).step_by(components);
+            for (value, node) in of_points.zip(&plane.nodes) {
                 *value = offset + f64::from(node.now()) * unit;
             }
         }
@@ -73,8 +73,8 @@ impl Grid {
     /// Gives points with a mask their tuples.
     pub(super) fn put_masked(&self, values: &mut [f64]) {
         let components = self.planes.len();
-        for (place, tuple) in self.mask.iter().flat_map(Mask::tuples) {
-            values[place * components..][..components].copy_from_slice(tuple);
+        for (index, tuple) in self.mask.iter().flat_map(Mask::tuples) {
+            values[index * components..][..components].copy_from_slice(tuple);
         }
     }
 }

@@ -20,7 +20,7 @@ pub(super) const BLOCK: usize = 256;
 /// the nearest in space among those that are near in the mesh, by ordinary kriging.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hierarchy {
-    /// The point that stands at each place of the order.
+    /// The point that stands at each index of the order.
     order: Vec<u32>,
     stencils: Vec<Stencil>,
     /// The ends of the runs.
@@ -32,23 +32,23 @@ pub struct Hierarchy {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub(super) struct Stencil {
-    pub(super) places: [u32; NEIGHBOURS],
+    pub(super) indices: [u32; NEIGHBOURS],
     pub(super) weights: [f32; NEIGHBOURS],
 }
 
 impl Stencil {
-    const NONE: Self = Self { places: [0; NEIGHBOURS], weights: [0.0; NEIGHBOURS] };
+    const NONE: Self = Self { indices: [0; NEIGHBOURS], weights: [0.0; NEIGHBOURS] };
 }
 
 impl Hierarchy {
-    /// The hierarchy of points at these places, joined by these edges.
+    /// The hierarchy of points at these positions, joined by these edges.
     ///
     /// # Panics
     /// If an edge names a point that there is none of.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
-    pub fn new(places: &[[i32; 3]], edges: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
-        let count = places.len();
+    pub fn new(positions: &[[i32; 3]], edges: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+        let count = positions.len();
         let mut levels = Vec::new();
         let mut graph = Graph::new(count, edges);
         let mut points: Vec<u32> = (0..count as u32).collect();
@@ -65,14 +65,14 @@ impl Hierarchy {
         let mut order = Vec::with_capacity(count);
         order.extend(&points);
         levels.iter().rev().for_each(|level| level.put_in_order(&mut order));
-        let mut place_of = vec![0; count];
-        for (place, &point) in (0u32..).zip(&order) {
-            place_of[point as usize] = place;
+        let mut index_of = vec![0; count];
+        for (index, &point) in (0u32..).zip(&order) {
+            index_of[point as usize] = index;
         }
         let mut stencils = vec![Stencil::NONE; count];
         with_wide_registers(
             #[inline(always)]
-            || set_stencils(places, &place_of, &points, &levels, &mut stencils),
+            || set_stencils(positions, &index_of, &points, &levels, &mut stencils),
         );
         let runs = runs(&stencils);
         Self { order, stencils, runs }
@@ -90,7 +90,7 @@ impl Hierarchy {
         self.order.is_empty()
     }
 
-    /// The point that stands at each place of the order.
+    /// The point that stands at each index of the order.
     #[must_use]
     pub fn order(&self) -> &[u32] {
         &self.order
@@ -100,7 +100,7 @@ impl Hierarchy {
         &self.stencils
     }
 
-    /// All places, in runs of which none is predicted from another of its run. Each lies in one
+    /// All indices, in runs of which none is predicted from another of its run. Each lies in one
     /// [`BLOCK`].
     #[inline(always)]
     pub(super) fn runs(&self) -> impl Iterator<Item = Range<usize>> {
@@ -117,19 +117,19 @@ impl Hierarchy {
 /// that are near each other lie near each other in memory.
 #[inline(always)]
 fn set_stencils(
-    places: &[[i32; 3]],
-    place_of: &[u32],
+    positions: &[[i32; 3]],
+    index_of: &[u32],
     coarsest: &[u32],
     levels: &[Level],
     stencils: &mut [Stencil],
 ) {
     let mut weighing = Weighing { fours: [const { Waiting::NONE }; NEIGHBOURS + 1], stencils };
     for (index, &point) in coarsest.iter().enumerate() {
-        let mut nearest = Nearest::to(places[point as usize]);
+        let mut nearest = Nearest::to(positions[point as usize]);
         for &earlier in &coarsest[index.saturating_sub(COARSEST)..index] {
-            nearest.look(places[earlier as usize], earlier);
+            nearest.look(positions[earlier as usize], earlier);
         }
-        weighing.add(place_of[point as usize], &nearest, places, place_of);
+        weighing.add(index_of[point as usize], &nearest, positions, index_of);
     }
     for level in levels {
         let mut last = vec![u32::MAX; level.points.len()];
@@ -138,20 +138,20 @@ fn set_stencils(
             if colour == 0 {
                 continue;
             }
-            let mut nearest = Nearest::to(places[point as usize]);
+            let mut nearest = Nearest::to(positions[point as usize]);
             let mut look = |other: u32| {
                 if level.colours[other as usize] < colour
                     && std::mem::replace(&mut last[other as usize], local) != local
                 {
                     let other = level.points[other as usize];
-                    nearest.look(places[other as usize], other);
+                    nearest.look(positions[other as usize], other);
                 }
             };
             for &other in level.graph.of(local) {
                 look(other);
                 level.graph.of(other).iter().for_each(|&further| look(further));
             }
-            weighing.add(place_of[point as usize], &nearest, places, place_of);
+            weighing.add(index_of[point as usize], &nearest, positions, index_of);
         }
     }
     weighing.finish();
@@ -172,10 +172,10 @@ impl Nearest {
         Self { to, squares, points, count: 0 }
     }
 
-    /// Looks at another point, which is at this place.
+    /// Looks at another point, which is at this position.
     #[inline(always)]
-    fn look(&mut self, place: [i32; 3], point: u32) {
-        let square = square(place, self.to);
+    fn look(&mut self, position: [i32; 3], point: u32) {
+        let square = square(position, self.to);
         let Self { squares, points, count, .. } = self;
         let is_before = |a: f64, of: u32| square < a || (square == a && point < of);
         if !is_before(squares[NEIGHBOURS - 1], points[NEIGHBOURS - 1]) {
@@ -195,13 +195,13 @@ impl Nearest {
 #[derive(Clone, Copy)]
 struct Waiting {
     count: usize,
-    /// Where each stands, and the places of its neighbours.
-    places: [(u32, [u32; NEIGHBOURS]); LANES],
+    /// The index of each, and those of its neighbours.
+    indices: [(u32, [u32; NEIGHBOURS]); LANES],
     four: Four,
 }
 
 impl Waiting {
-    const NONE: Self = Self { count: 0, places: [(0, [0; NEIGHBOURS]); LANES], four: Four::NONE };
+    const NONE: Self = Self { count: 0, indices: [(0, [0; NEIGHBOURS]); LANES], four: Four::NONE };
 }
 
 /// Weighs the neighbours of points, four points at a time.
@@ -211,21 +211,21 @@ struct Weighing<'a> {
 }
 
 impl Weighing<'_> {
-    /// Takes the point that stands at a place of the order, with its nearest.
+    /// Takes the point that stands at this index of the order, with its nearest.
     #[inline(always)]
-    fn add(&mut self, place: u32, nearest: &Nearest, at: &[[i32; 3]], place_of: &[u32]) {
+    fn add(&mut self, own: u32, nearest: &Nearest, at: &[[i32; 3]], index_of: &[u32]) {
         let count = nearest.count;
         let waiting = &mut self.fours[count];
         let lane = waiting.count;
-        let mut places = [0; NEIGHBOURS];
-        for (index, &point) in nearest.points[..count].iter().enumerate() {
-            places[index] = place_of[point as usize];
-            waiting.four.set(lane, index, at[point as usize], nearest.squares[index]);
+        let mut indices = [0; NEIGHBOURS];
+        for (neighbour, &point) in nearest.points[..count].iter().enumerate() {
+            indices[neighbour] = index_of[point as usize];
+            waiting.four.set(lane, neighbour, at[point as usize], nearest.squares[neighbour]);
         }
         // Behind the last stands the nearest again, with no weight.
-        let first = places[0];
-        places[count..].fill(first);
-        waiting.places[lane] = (place, places);
+        let first = indices[0];
+        indices[count..].fill(first);
+        waiting.indices[lane] = (own, indices);
         waiting.count = lane + 1;
         if waiting.count == LANES {
             waiting.put(count, self.stencils);
@@ -245,22 +245,22 @@ impl Waiting {
     #[inline(always)]
     fn put(&mut self, neighbours: usize, stencils: &mut [Stencil]) {
         let weights = weights(&self.four, neighbours);
-        for (&(place, places), weights) in self.places[..self.count].iter().zip(weights) {
-            stencils[place as usize] = Stencil { places, weights };
+        for (&(own, indices), weights) in self.indices[..self.count].iter().zip(weights) {
+            stencils[own as usize] = Stencil { indices, weights };
         }
         self.count = 0;
     }
 }
 
-/// The ends of the runs of these places.
+/// The ends of the runs of these stencils.
 #[expect(clippy::cast_possible_truncation, reason = "points are numbered with 32 bits")]
 fn runs(stencils: &[Stencil]) -> Vec<u32> {
     let (mut runs, mut start) = (Vec::new(), 0);
-    for (place, stencil) in stencils.iter().enumerate() {
-        let leans = stencil.places.iter().any(|&other| other as usize >= start);
-        if place > start && (leans || place % BLOCK == 0) {
-            runs.push(place as u32);
-            start = place;
+    for (index, stencil) in stencils.iter().enumerate() {
+        let leans = stencil.indices.iter().any(|&other| other as usize >= start);
+        if index > start && (leans || index % BLOCK == 0) {
+            runs.push(index as u32);
+            start = index;
         }
     }
     if !stencils.is_empty() {
@@ -275,11 +275,11 @@ mod tests {
 
     /// The edges of a grid of points, with one diagonal in each square.
     fn grid(side: u32) -> (Vec<[i32; 3]>, Vec<[u32; 2]>) {
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         let mut edges = Vec::new();
         for y in 0..side {
             for x in 0..side {
-                places.push([x as i32 * 100, y as i32 * 100, 0]);
+                positions.push([x as i32 * 100, y as i32 * 100, 0]);
                 let here = y * side + x;
                 if x + 1 < side {
                     edges.push([here, here + 1]);
@@ -292,21 +292,21 @@ mod tests {
                 }
             }
         }
-        (places, edges)
+        (positions, edges)
     }
 
     #[test]
     fn every_point_stands_once_and_behind_those_it_is_predicted_from() {
-        let (places, edges) = grid(40);
-        let hierarchy = Hierarchy::new(&places, edges.iter().copied());
+        let (positions, edges) = grid(40);
+        let hierarchy = Hierarchy::new(&positions, edges.iter().copied());
         let mut order = hierarchy.order().to_vec();
         order.sort_unstable();
         assert!(order.into_iter().eq(0..1600));
-        for (place, stencil) in (0u32..).zip(hierarchy.stencils()).skip(1) {
+        for (index, stencil) in (0u32..).zip(hierarchy.stencils()).skip(1) {
             let sum: f32 = stencil.weights.iter().sum();
             assert!((sum - 1.0).abs() < 1e-5, "{sum}");
-            for (&other, &weight) in stencil.places.iter().zip(&stencil.weights) {
-                assert!(other < place || weight == 0.0);
+            for (&other, &weight) in stencil.indices.iter().zip(&stencil.weights) {
+                assert!(other < index || weight == 0.0);
             }
         }
         let full = hierarchy.stencils().iter().filter(|stencil| stencil.weights[7] != 0.0).count();
@@ -314,15 +314,15 @@ mod tests {
     }
 
     #[test]
-    fn no_place_is_predicted_from_another_of_its_run() {
-        let (places, edges) = grid(40);
-        let hierarchy = Hierarchy::new(&places, edges.iter().copied());
+    fn no_point_is_predicted_from_another_of_its_run() {
+        let (positions, edges) = grid(40);
+        let hierarchy = Hierarchy::new(&positions, edges.iter().copied());
         let mut next = 0;
         for run in hierarchy.runs() {
             assert_eq!(run.start, next);
             assert!(run.end > next && run.start / BLOCK == (run.end - 1) / BLOCK);
             next = run.end;
-            let others = hierarchy.stencils()[run.clone()].iter().flat_map(|of| of.places);
+            let others = hierarchy.stencils()[run.clone()].iter().flat_map(|of| of.indices);
             assert!(run.start == 0 || others.into_iter().all(|other| (other as usize) < run.start));
         }
         assert_eq!(next, 1600);
@@ -332,12 +332,12 @@ mod tests {
 
     #[test]
     fn points_without_edges_and_points_with_very_many_have_their_place() {
-        let places: Vec<[i32; 3]> = (0..500).map(|x| [x, 0, 0]).collect();
-        assert_eq!(Hierarchy::new(&places, std::iter::empty()).len(), 500);
+        let positions: Vec<[i32; 3]> = (0..500).map(|x| [x, 0, 0]).collect();
+        assert_eq!(Hierarchy::new(&positions, std::iter::empty()).len(), 500);
         let star = (1..500).map(|leaf| [0, leaf]);
-        assert_eq!(Hierarchy::new(&places, star).len(), 500);
+        assert_eq!(Hierarchy::new(&positions, star).len(), 500);
         let other_star = (0..499).map(|leaf| [499, leaf]);
-        assert_eq!(Hierarchy::new(&places, other_star).len(), 500);
+        assert_eq!(Hierarchy::new(&positions, other_star).len(), 500);
         assert!(Hierarchy::new(&[], std::iter::empty()).is_empty());
     }
 }

@@ -5,7 +5,7 @@ use super::connectivity::Third;
 
 /// The encoder's source.
 pub(super) struct Known<'a> {
-    places: &'a [[i32; 3]],
+    positions: &'a [[i32; 3]],
     triangles: &'a [[u32; 3]],
     features: Option<&'a [u32]>,
     lines: &'a [[u32; 2]],
@@ -25,16 +25,16 @@ const UNMET: u32 = u32::MAX;
 
 impl<'a> Known<'a> {
     pub(super) fn new(
-        places: &'a [[i32; 3]],
+        positions: &'a [[i32; 3]],
         triangles: &'a [[u32; 3]],
         features: Option<&'a [u32]>,
         lines: &'a [[u32; 2]],
     ) -> Self {
-        let mut starts = vec![0u32; places.len() + 1];
+        let mut starts = vec![0u32; positions.len() + 1];
         for &point in triangles.as_flattened() {
             starts[point as usize + 1] += 1;
         }
-        for point in 0..places.len() {
+        for point in 0..positions.len() {
             starts[point + 1] += starts[point];
         }
         let mut next = starts.clone();
@@ -45,11 +45,11 @@ impl<'a> Known<'a> {
                 next[from as usize] += 1;
             }
         }
-        for point in 0..places.len() {
+        for point in 0..positions.len() {
             sides[starts[point] as usize..starts[point + 1] as usize].sort_unstable();
         }
         Self {
-            places,
+            positions,
             triangles,
             features,
             lines,
@@ -58,8 +58,8 @@ impl<'a> Known<'a> {
             is_done: vec![false; triangles.len()],
             next_seed: 0,
             asked: 0,
-            new_points: vec![UNMET; places.len()],
-            old_points: Vec::with_capacity(places.len()),
+            new_points: vec![UNMET; positions.len()],
+            old_points: Vec::with_capacity(positions.len()),
             old_triangles: Vec::with_capacity(triangles.len()),
         }
     }
@@ -115,8 +115,8 @@ impl Source for Known<'_> {
         }
     }
 
-    fn place(&mut self, point: u32) -> [i32; 3] {
-        self.places[self.old_points[point as usize] as usize]
+    fn position(&mut self, point: u32) -> [i32; 3] {
+        self.positions[self.old_points[point as usize] as usize]
     }
 
     fn feature(&mut self) -> Option<u32> {
@@ -130,7 +130,7 @@ impl Source for Known<'_> {
     }
 
     fn rest(&mut self, _: u32) {
-        for point in (0u32..).take(self.places.len()) {
+        for point in (0u32..).take(self.positions.len()) {
             self.number(point);
         }
     }

@@ -15,7 +15,7 @@ const SILL: f64 = 64.0;
 /// A pivot below it is taken for zero.
 const LEAST_PIVOT: f64 = 1e-9;
 
-/// The square of the distance between two places.
+/// The square of the distance between two positions.
 #[inline(always)]
 pub(super) fn square(a: [i32; 3], b: [i32; 3]) -> f64 {
     let x = f64::from(a[0]) - f64::from(b[0]);
@@ -24,23 +24,23 @@ pub(super) fn square(a: [i32; 3], b: [i32; 3]) -> f64 {
     x * x + y * y + z * z
 }
 
-/// The neighbours that four values are predicted from, the nearest first: their places, and the squares
-/// of their distances.
+/// The neighbours that four values are predicted from, the nearest first: their positions, and the
+/// squares of their distances.
 #[derive(Clone, Copy)]
 pub(super) struct Four {
-    places: [[[i32; LANES]; 3]; NEIGHBOURS],
+    positions: [[[i32; LANES]; 3]; NEIGHBOURS],
     squares: [Lanes; NEIGHBOURS],
 }
 
 impl Four {
     pub(super) const NONE: Self =
-        Self { places: [[[0; LANES]; 3]; NEIGHBOURS], squares: [Lanes::ZERO; NEIGHBOURS] };
+        Self { positions: [[[0; LANES]; 3]; NEIGHBOURS], squares: [Lanes::ZERO; NEIGHBOURS] };
 
     /// Sets a neighbour of one of the four.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, index: usize, place: [i32; 3], square: f64) {
-        for (axis, steps) in place.into_iter().enumerate() {
-            self.places[index][axis][lane] = steps;
+    pub(super) fn set(&mut self, lane: usize, index: usize, position: [i32; 3], square: f64) {
+        for (axis, steps) in position.into_iter().enumerate() {
+            self.positions[index][axis][lane] = steps;
         }
         self.squares[index].0[lane] = square;
     }
@@ -69,16 +69,16 @@ pub(super) fn weights(of: &Four, count: usize) -> [[f32; NEIGHBOURS]; LANES] {
     weights
 }
 
-/// Solves four systems, of which those are not sound that have fewer than two places, or places that
-/// all coincide.
+/// Solves four systems, of which those are not sound that have fewer than two positions, or
+/// positions that all coincide.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "the indices of a matrix")]
 fn solve(of: &Four, count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
     let mut is_sound = [count >= 2; LANES];
     let mut mean = Lanes::ZERO;
-    let mut places = [[Lanes::ZERO; 3]; NEIGHBOURS];
+    let mut positions = [[Lanes::ZERO; 3]; NEIGHBOURS];
     for row in 0..count {
-        places[row] = of.places[row].map(|axis| Lanes(axis.map(f64::from)));
+        positions[row] = of.positions[row].map(|axis| Lanes(axis.map(f64::from)));
         mean += of.squares[row].sqrt();
     }
     mean = mean / Lanes::all(count as f64);
@@ -90,14 +90,14 @@ fn solve(of: &Four, count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
         Lanes::all(SILL) - distance * distance.sqrt()
     };
     // The lower triangle, factored in place: L below the diagonal, the pivots on it. Beside it the
-    // two right-hand sides: the covariances with the place sought, and ones.
+    // two right-hand sides: the covariances with the position sought, and ones.
     let mut matrix = [[Lanes::ZERO; NEIGHBOURS]; NEIGHBOURS];
     let (mut right, mut ones) = ([Lanes::ZERO; NEIGHBOURS], [Lanes::all(1.0); NEIGHBOURS]);
     for row in 0..count {
         for column in 0..row {
-            let x = places[row][0] - places[column][0];
-            let y = places[row][1] - places[column][1];
-            let z = places[row][2] - places[column][2];
+            let x = positions[row][0] - positions[column][0];
+            let y = positions[row][1] - positions[column][1];
+            let z = positions[row][2] - positions[column][2];
             matrix[row][column] = covariance(x * x + y * y + z * z);
         }
         matrix[row][row] = Lanes::all(SILL + NUGGET);
@@ -150,12 +150,12 @@ fn solve(of: &Four, count: usize) -> ([Lanes; NEIGHBOURS], [bool; LANES]) {
 mod tests {
     use super::*;
 
-    fn of(places: &[[i32; 3]], at: [i32; 3]) -> [f32; NEIGHBOURS] {
+    fn of(positions: &[[i32; 3]], at: [i32; 3]) -> [f32; NEIGHBOURS] {
         let mut four = Four::NONE;
-        for (index, &place) in places.iter().enumerate() {
-            four.set(1, index, place, square(place, at));
+        for (index, &position) in positions.iter().enumerate() {
+            four.set(1, index, position, square(position, at));
         }
-        weights(&four, places.len())[1]
+        weights(&four, positions.len())[1]
     }
 
     #[test]

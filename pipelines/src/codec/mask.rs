@@ -34,8 +34,8 @@ fn code<B: Bits>(
         if (1..tuple).contains(&of[point]) {
             continue;
         }
-        let is_set = |&place: &u32| (place as usize) < point && of[place as usize] == tuple;
-        let context = stencil.places[..COUNTED].iter().filter(|place| is_set(place)).count();
+        let is_set = |&index: &u32| (index as usize) < point && of[index as usize] == tuple;
+        let context = stencil.indices[..COUNTED].iter().filter(|index| is_set(index)).count();
         if bits.bit(&mut models[context], of[point] == tuple)? {
             of[point] = tuple;
         }
@@ -57,13 +57,13 @@ fn print(tuple: &[f64]) -> u64 {
 
 impl Mask {
     /// The tuples that many points share, where they are enough to be worth it. `order` says which
-    /// tuple stands at each place.
+    /// tuple stands at each index.
     pub(super) fn find(values: &[f64], components: usize, order: &[u32]) -> Option<Self> {
         const SAMPLES: usize = 64;
-        let tuple = |place: usize| &values[order[place] as usize * components..][..components];
+        let tuple = |index: usize| &values[order[index] as usize * components..][..components];
         let mut mask = Self { points: vec![], of: vec![0; order.len()], tuples: vec![] };
         let mut number = 0;
-        // The places that have no tuple yet; at first all of them.
+        // The indices that have no tuple yet; at first all of them.
         let mut left: Option<Vec<usize>> = None;
         while mask.tuples.len() < MOST {
             let count = left.as_ref().map_or(order.len(), Vec::len);
@@ -80,13 +80,13 @@ impl Mask {
                 break;
             }
             let (set, rest): (Vec<usize>, Vec<usize>) =
-                (0..count).map(at).partition(|&place| same(tuple(place), best));
+                (0..count).map(at).partition(|&index| same(tuple(index), best));
             if set.len() * 16 < count || (number > 0 && set.len() < LEAST) {
                 break;
             }
             left = Some(rest);
             number += 1;
-            set.into_iter().for_each(|place| mask.of[place] = number);
+            set.into_iter().for_each(|index| mask.of[index] = number);
             mask.tuples.push(best.to_vec());
         }
         if number == 0 {
@@ -143,11 +143,11 @@ impl Mask {
         Ok(Self { points: of.iter().map(|&of| of != 0).collect(), of, tuples })
     }
 
-    /// The places that have a tuple, with it.
+    /// The indices that have a tuple, with it.
     pub(super) fn tuples(&self) -> impl Iterator<Item = (usize, &[f64])> {
-        let tuple = |(place, &of): (usize, &u8)| {
-            let index = usize::from(of).checked_sub(1)?;
-            Some((place, &self.tuples[index][..]))
+        let tuple = |(index, &of): (usize, &u8)| {
+            let tuple = usize::from(of).checked_sub(1)?;
+            Some((index, &self.tuples[tuple][..]))
         };
         self.of.iter().enumerate().filter_map(tuple)
     }

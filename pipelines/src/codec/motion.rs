@@ -59,7 +59,7 @@ impl Motion {
     }
 
     /// Codes the next positions and appends them to a message. `order` says which of `points` stands
-    /// at each place of the hierarchy.
+    /// at each index of the hierarchy.
     ///
     /// # Errors
     /// [`CodecError::Length`] where the points do not fit the topology, [`CodecError::Positions`]
@@ -81,7 +81,7 @@ impl Motion {
             self.is_free = false;
             return Ok(());
         }
-        let point = |&place: &u32| points.get(place as usize).copied();
+        let point = |&at: &u32| points.get(at as usize).copied();
         let wanted: Option<Vec<[f64; 3]>> = order.iter().map(point).collect();
         let wanted = wanted.ok_or(CodecError::Length { found, expected })?.into_flattened();
         if wanted.iter().any(|x| !x.is_finite()) {
@@ -118,7 +118,7 @@ impl Motion {
         let start = message.len();
         message.push(NEW);
         let before: Vec<f64> = match &self.last {
-            Some((last, _)) => order.iter().flat_map(|&place| last[place as usize]).collect(),
+            Some((last, _)) => order.iter().flat_map(|&point| last[point as usize]).collect(),
             None => self.now.clone(),
         };
         let code = |values: &[f64], bound: f64, message: &mut Vec<u8>| {

@@ -15,7 +15,7 @@ pub(super) type Coefficients = [f32; 4];
 fn sum(nodes: &[Node], stencil: &Stencil, context: &[f32; NEIGHBOURS], sums: &mut Node) {
     let mut sum = Node::ZERO;
     for index in 0..NEIGHBOURS {
-        let node = nodes[stencil.places[index] as usize];
+        let node = nodes[stencil.indices[index] as usize];
         sum.add(node, stencil.weights[index], context[index]);
     }
     *sums = sum;

@@ -15,11 +15,11 @@ const PER_BYTE: usize = 1024;
 const MOST: usize = 1 << 27;
 
 /// The cells and the reference positions of a mesh of triangles and lines, as they are decoded.
-/// Points have the numbers of their places in the hierarchy.
+/// Points have the numbers that are their indices in the hierarchy.
 #[derive(Debug, Clone)]
 pub struct Topology {
     points: Hierarchy,
-    places: Vec<[i32; 3]>,
+    positions: Vec<[i32; 3]>,
     step: f64,
     offset: [f64; 3],
     triangles: Vec<[u32; 3]>,
@@ -69,7 +69,7 @@ impl Topology {
         }
         let total = count + triangles.len() + lines.len();
         check_total(total as u64, MOST)?;
-        let (places, step, offset) = grid(points, bound).ok_or(CodecError::Positions)?;
+        let (positions, step, offset) = grid(points, bound).ok_or(CodecError::Positions)?;
 
         let mut message = Vec::new();
         put_count(&mut message, count);
@@ -79,7 +79,7 @@ impl Topology {
         message.extend(step.to_le_bytes());
         message.extend(offset.iter().flat_map(|offset| offset.to_le_bytes()));
         let mut bits = Writer::new();
-        let mut source = Known::new(&places, triangles, features, lines);
+        let mut source = Known::new(&positions, triangles, features, lines);
         let coded = code(&mut bits, &mut source, count, triangles.len(), lines.len())?;
         message.extend(bits.finish());
         message.resize(message.len().max(total.div_ceil(PER_BYTE)), 0);
@@ -113,20 +113,20 @@ impl Topology {
     }
 
     fn new(coded: Walked, step: f64, offset: [f64; 3], has_features: bool) -> Self {
-        let Walked { places, mut triangles, features, mut lines, .. } = coded;
+        let Walked { positions, mut triangles, features, mut lines, .. } = coded;
         let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
         let edges = triangles.iter().flat_map(sides).chain(lines.iter().copied());
-        let points = Hierarchy::new(&places, edges);
-        let mut place_of = vec![0u32; places.len()];
-        for (place, &point) in (0u32..).zip(points.order()) {
-            place_of[point as usize] = place;
+        let points = Hierarchy::new(&positions, edges);
+        let mut index_of = vec![0u32; positions.len()];
+        for (index, &point) in (0u32..).zip(points.order()) {
+            index_of[point as usize] = index;
         }
         let cells = triangles.as_flattened_mut().iter_mut().chain(lines.as_flattened_mut());
-        cells.for_each(|point| *point = place_of[*point as usize]);
-        let places = points.order().iter().map(|&point| places[point as usize]).collect();
+        cells.for_each(|point| *point = index_of[*point as usize]);
+        let positions = points.order().iter().map(|&point| positions[point as usize]).collect();
         let features = has_features.then_some(features);
         let elements = OnceLock::new();
-        Self { points, places, step, offset, triangles, features, lines, elements }
+        Self { points, positions, step, offset, triangles, features, lines, elements }
     }
 
     /// The hierarchy of the points.
@@ -140,14 +140,14 @@ impl Topology {
     #[must_use]
     pub fn elements(&self) -> &Hierarchy {
         self.elements.get_or_init(|| {
-            let place = |point: u32| self.places[point as usize];
+            let position = |point: u32| self.positions[point as usize];
             let centres: Vec<[i32; 3]> = (self.triangles.iter())
                 .map(|&corners| {
-                    let [a, b, c] = corners.map(place);
+                    let [a, b, c] = corners.map(position);
                     std::array::from_fn(|axis| a[axis] + b[axis] + c[axis])
                 })
                 .chain(self.lines.iter().map(|&ends| {
-                    let [a, b] = ends.map(place);
+                    let [a, b] = ends.map(position);
                     std::array::from_fn(|axis| a[axis] + b[axis] + (a[axis] + b[axis]) / 2)
                 }))
                 .collect();
@@ -156,7 +156,7 @@ impl Topology {
         })
     }
 
-    /// The triangles, by the places of their points.
+    /// The triangles, by the indices of their points.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
@@ -168,7 +168,7 @@ impl Topology {
         self.features.as_deref()
     }
 
-    /// The lines, by the places of their points.
+    /// The lines, by the indices of their points.
     #[must_use]
     pub fn lines(&self) -> &[[u32; 2]] {
         &self.lines
@@ -177,10 +177,10 @@ impl Topology {
     /// The reference positions.
     #[must_use]
     pub fn positions(&self) -> Vec<[f64; 3]> {
-        let position = |place: &[i32; 3]| {
-            std::array::from_fn(|axis| self.offset[axis] + self.step * f64::from(place[axis]))
+        let at = |position: &[i32; 3]| {
+            std::array::from_fn(|axis| self.offset[axis] + self.step * f64::from(position[axis]))
         };
-        self.places.iter().map(position).collect()
+        self.positions.iter().map(at).collect()
     }
 }
 
@@ -211,9 +211,9 @@ fn grid(points: &[[f64; 3]], bound: f64) -> Option<Grid> {
     if !bound.is_finite() || !step.is_normal() || extent.is_nan() || extent / step >= MOST_STEPS {
         return None;
     }
-    let mut places = Vec::with_capacity(points.len());
+    let mut positions = Vec::with_capacity(points.len());
     for point in points {
-        let mut place = [0; 3];
+        let mut position = [0; 3];
         for axis in 0..3 {
             let steps = ((point[axis] - offset[axis]) / step).round_ties_even();
             let off = (offset[axis] + step * steps - point[axis]).abs();
@@ -222,12 +222,12 @@ fn grid(points: &[[f64; 3]], bound: f64) -> Option<Grid> {
             }
             #[expect(clippy::cast_possible_truncation, reason = "checked above")]
             {
-                place[axis] = steps as i32;
+                position[axis] = steps as i32;
             }
         }
-        places.push(place);
+        positions.push(position);
     }
-    Some((places, step, offset))
+    Some((positions, step, offset))
 }
 
 /// Pairs of elements that share an edge, or a point where they are lines.
