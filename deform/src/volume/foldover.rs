@@ -9,7 +9,7 @@ use crate::vector::{add, cross, determinant, dot, length, scale, subtract, unit}
 const VOLUME: f64 = 0.5;
 
 /// The energy of a corner that is as in the reference: the least there is.
-pub(super) const REST: f64 = 3.0 * (1.0 - VOLUME) + 2.0 * VOLUME;
+pub(super) const ENERGY_AT_REST: f64 = 3.0 * (1.0 - VOLUME) + 2.0 * VOLUME;
 
 /// Eigenvalues of a Hessian are kept above this part of that of the shape term.
 const LEAST: f64 = 1e-3;

@@ -100,7 +100,7 @@ impl Untangler {
         }
         let mut points = points.to_vec();
         let mut near = self.numbering.gather(&points).into_owned();
-        let rest = foldover::REST
+        let rest = foldover::ENERGY_AT_REST
             * self.domain.communicator().reduced(Reduction::Sum, real(self.corners.len()));
         let stiffnesses = self.newton.stiffnesses(&self.corners);
         let mut stiffness = FIRST_PULL;

@@ -2,6 +2,7 @@
 
 mod audience;
 mod cost;
+mod dormancy;
 mod due;
 mod history;
 #[cfg(feature = "files")]
@@ -9,7 +10,6 @@ mod mesh_trial;
 mod output;
 mod pipeline;
 mod replace;
-mod rest;
 mod saved;
 mod trigger;
 
@@ -138,7 +138,7 @@ impl Runner {
     /// Whether any pipeline waits for what [`tell`](Self::tell) tells, or heeds whether it is watched.
     #[must_use]
     pub fn listens(&self) -> bool {
-        let listens = |it: &Prepared| it.due.listens() || it.rest.only_shows();
+        let listens = |it: &Prepared| it.due.listens() || it.dormancy.only_shows();
         self.pipelines.iter().any(listens)
     }
 
@@ -221,7 +221,7 @@ impl Runner {
                 continue;
             }
             prepared.due.take(&now);
-            let is_back = prepared.rest.ends(&now);
+            let is_back = prepared.dormancy.wakes(&now);
             if !(prepared.thinning.admits() || is_back) {
                 continue;
             }

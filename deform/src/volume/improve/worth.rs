@@ -15,7 +15,7 @@ pub(super) const ENOUGH: f64 = 0.8;
 const GAIN: f64 = 1e-3;
 
 /// The least gain in the mean or the least quality while that is still too low; less is rounding.
-const REST: f64 = 1e-6;
+const LEAST_GAIN: f64 = 1e-6;
 
 /// The quality of what can be moved, on all ranks.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,7 @@ impl Qualities {
     /// Whether the least quality is high enough, or as high as that of the cells that cannot be moved,
     /// `fixed`: it is the mean that counts from there on.
     pub(super) fn are_enough(&self, fixed: f64) -> bool {
-        self.least + REST >= fixed.min(ENOUGH)
+        self.least + LEAST_GAIN >= fixed.min(ENOUGH)
     }
 
     /// Whether these are so much better than those `before` a sweep, or a part of one, that the
@@ -51,12 +51,12 @@ impl Qualities {
     pub(super) fn are_worth_more(&self, before: &Self, fixed: f64, part: f64) -> bool {
         let gain = (self.sum - before.sum) / before.worn.max(1.0);
         gain >= part * GAIN
-            || !before.are_enough(fixed) && gain.max(self.rise(before, fixed)) >= REST
+            || !before.are_enough(fixed) && gain.max(self.rise(before, fixed)) >= LEAST_GAIN
     }
 
     /// Whether the mesh is better by these than by those `before`.
     pub(super) fn are_better(&self, before: &Self, fixed: f64) -> bool {
-        self.sum > before.sum || self.rise(before, fixed) >= REST
+        self.sum > before.sum || self.rise(before, fixed) >= LEAST_GAIN
     }
 
     /// By how much the least quality of the mesh has risen, whose cells that cannot be moved have

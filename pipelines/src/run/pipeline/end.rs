@@ -61,14 +61,14 @@ impl Prepared {
     ) -> Option<String> {
         let seconds = (ended - begun).max(0.0);
         self.cost.ran(seconds);
-        let rests = self.rest.only_shows() && !self.rest.is_watched(now);
+        let rests = self.dormancy.only_shows() && !self.dormancy.is_watched(now);
         if !rests && !self.thinning.is_limited() {
             return None;
         }
         let mut told = if communicator.rank() == 0 { [seconds, ended] } else { [0.0; 2] };
         communicator.reduce(Reduction::Maximum, &mut told);
         if rests {
-            self.rest.begin(now, told[0]);
+            self.dormancy.begin(now, told[0]);
             self.thinning.forget();
             return None;
         }

@@ -18,10 +18,10 @@ use tombolo_deform::edit::Edit;
 use tombolo_deform::mesh::ArrayView;
 
 use super::cost::{Cost, Thinning};
+use super::dormancy::Dormancy;
 use super::due::{Clock, Now};
 use super::history::Board;
 use super::output::{MonitorValues, Output};
-use super::rest::Rest;
 use super::trigger::Trigger;
 use crate::derive::{Basis, derive, follow, wall_shear_stress, with_derived};
 use crate::extract::{
@@ -40,7 +40,7 @@ pub(super) struct Prepared {
     /// Its index in the configuration.
     pub(super) index: usize,
     pub(super) due: Clock,
-    pub(super) rest: Rest,
+    pub(super) dormancy: Dormancy,
     pub(super) thinning: Thinning,
     pub(super) cost: Cost,
     /// Whether it runs when it is due.
@@ -148,10 +148,10 @@ impl Prepared {
     #[inline]
     pub(super) fn is_due(&self, now: &Now) -> bool {
         self.is_chosen
-            && match self.rest.only_shows() {
+            && match self.dormancy.only_shows() {
                 // What went by while it rested is made up for.
-                true if self.rest.is_watched(now) => self.due.has_struck(now),
-                true => self.due.is_due(now) && self.rest.is_over(now),
+                true if self.dormancy.is_watched(now) => self.due.has_struck(now),
+                true => self.due.is_due(now) && self.dormancy.is_over(now),
                 false => self.due.is_due(now),
             }
     }

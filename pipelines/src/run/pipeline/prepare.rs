@@ -6,9 +6,9 @@ use std::sync::Arc;
 use tombolo_deform::communicator::{Garbled, Reader, Writer};
 
 use super::super::cost::{Cost, Thinning};
+use super::super::dormancy::Dormancy;
 use super::super::due::Clock;
 use super::super::output::Table;
-use super::super::rest::Rest;
 use super::super::trigger::Trigger;
 use super::Prepared;
 use crate::derive::Running;
@@ -87,7 +87,7 @@ impl Prepared {
             used: used.chain(hidden.iter().cloned()).collect(),
             hidden,
             due: Clock::new(pipeline.due),
-            rest: Rest::of(pipeline),
+            dormancy: Dormancy::of(pipeline),
             thinning: Thinning::new(pipeline.budget),
             cost: Cost::default(),
             is_chosen: true,
@@ -109,7 +109,7 @@ impl Prepared {
     /// Takes over what the same pipeline has come to, whose place among the others may have changed.
     pub(crate) fn go_on_from(&mut self, before: Self) {
         self.due = before.due;
-        self.rest = before.rest;
+        self.dormancy = before.dormancy;
         self.thinning = before.thinning;
         self.cost = before.cost;
         self.is_chosen = before.is_chosen;

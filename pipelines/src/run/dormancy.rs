@@ -1,4 +1,4 @@
-//! Views rest while nobody looks.
+//! Views are dormant while nobody looks.
 
 use super::{audience::Audience, due::Now};
 use crate::language::{Action, Due, Pipeline, Stage};
@@ -7,22 +7,22 @@ use crate::language::{Action, Due, Pipeline, Stage};
 /// that whoever comes has something to see at once.
 const SHARE: f64 = 1e-3;
 
-/// Whether a pipeline rests: one that only shows something does while nobody looks.
+/// Whether a pipeline is dormant: one that only shows something is while nobody looks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rest {
+pub(super) struct Dormancy {
     only_shows: bool,
     /// The audience that looks at its view alone.
-    looks: Audience,
-    /// The second on the clock of rank 0 that it rests until; none where it has not rested since somebody
-    /// looked.
+    view: Audience,
+    /// The second on the clock of rank 0 until which it is dormant; none where it has not been since
+    /// somebody looked.
     until: Option<f64>,
 }
 
-impl Rest {
+impl Dormancy {
     pub(super) fn of(pipeline: &Pipeline) -> Self {
         Self {
             only_shows: only_shows(pipeline),
-            looks: Audience::of([pipeline.name.as_str()]),
+            view: Audience::of([pipeline.name.as_str()]),
             until: None,
         }
     }
@@ -35,22 +35,22 @@ impl Rest {
     /// Whether somebody looks at its view.
     #[inline]
     pub(super) fn is_watched(&self, now: &Now) -> bool {
-        now.audience.includes(self.looks)
+        now.audience.includes(self.view)
     }
 
-    /// Whether it has rested for long enough.
+    /// Whether it has been dormant for long enough.
     #[inline]
     pub(super) fn is_over(&self, now: &Now) -> bool {
         self.until.is_none_or(|until| now.seconds >= until)
     }
 
-    /// Rests for so long that a run of these seconds is no more than its share of the time.
+    /// Is dormant for so long that a run of these seconds is no more than its share of the time.
     pub(super) fn begin(&mut self, now: &Now, seconds: f64) {
         self.until = Some(now.seconds + seconds / SHARE);
     }
 
     /// Whether this is the first run since somebody looks again.
-    pub(super) fn ends(&mut self, now: &Now) -> bool {
+    pub(super) fn wakes(&mut self, now: &Now) -> bool {
         self.is_watched(now) && self.until.take().is_some()
     }
 }
