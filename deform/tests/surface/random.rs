@@ -8,6 +8,26 @@ use tombolo_deform::edit::{
 };
 use tombolo_deform::shapes;
 
+/// What all edits have.
+struct Layer {
+    features: Vec<String>,
+    region: Option<Region>,
+    fixed: Vec<String>,
+    fixed_region: Option<Region>,
+    muted: bool,
+}
+
+/// The edit of a kind on this layer, with the fields of that kind.
+macro_rules! layered {
+    ($layer:expr, $kind:ident, $($field:ident: $value:expr),+) => {{
+        let Layer { features, region, fixed, fixed_region, muted } = $layer;
+        let name = None;
+        Edit::$kind($kind {
+            features, region, fixed, fixed_region, muted, name, $($field: $value),+
+        })
+    }};
+}
+
 fn absurd() -> BoxedStrategy<f64> {
     prop_oneof![
         4 => -2.0..2.0f64,
@@ -69,78 +89,33 @@ fn edit() -> impl Strategy<Value = Edit> {
                 kind,
             )| {
                 let (vector, matrix, number, center) = numbers;
-                let name = None;
+                let layer = Layer { features, region, fixed, fixed_region, muted };
                 match kind {
-                    0 => Edit::Translate(Translate {
-                        features,
-                        region,
-                        fixed,
-                        fixed_region,
-                        by: vector,
-                        harmonic_order,
-                        muted,
-                        name,
-                    }),
-                    1 => Edit::ScaleNormals(ScaleNormals {
-                        features,
-                        region,
-                        fixed,
-                        fixed_region,
-                        distance: number,
-                        harmonic_order,
-                        muted,
-                        name,
-                    }),
-                    2 => Edit::ScaleDirection(ScaleDirection {
-                        features,
-                        region,
-                        fixed,
-                        fixed_region,
-                        factors: vector,
-                        center,
-                        harmonic_order,
-                        muted,
-                        name,
-                    }),
-                    3 => Edit::Rotate(Rotate {
-                        features,
-                        region,
-                        fixed,
-                        fixed_region,
-                        axis: vector,
-                        degrees: number,
-                        center,
-                        harmonic_order,
-                        muted,
-                        name,
-                    }),
-                    4 => Edit::Affine(Affine {
-                        features,
-                        region,
-                        fixed,
-                        fixed_region,
-                        matrix,
-                        translation: vector,
-                        center,
-                        harmonic_order,
-                        muted,
-                        name,
-                    }),
+                    0 => layered!(layer, Translate, by: vector, harmonic_order: harmonic_order),
+                    1 => {
+                        layered!(layer, ScaleNormals, distance: number, harmonic_order: harmonic_order)
+                    }
+                    2 => layered!(
+                        layer, ScaleDirection,
+                        factors: vector, center: center, harmonic_order: harmonic_order
+                    ),
+                    3 => layered!(
+                        layer, Rotate,
+                        axis: vector, degrees: number, center: center, harmonic_order: harmonic_order
+                    ),
+                    4 => layered!(
+                        layer, Affine,
+                        matrix: matrix, translation: vector, center: center,
+                        harmonic_order: harmonic_order
+                    ),
                     _ => {
                         let (vertices, values): (Vec<u32>, Vec<Vector>) =
                             import.into_iter().unzip();
-                        Edit::Displacement(Displacement {
-                            features,
-                            region,
-                            fixed,
-                            fixed_region,
-                            file: None,
-                            vertices: vertices.into(),
-                            values: values.into(),
-                            scale: number,
-                            muted,
-                            name,
-                        })
+                        layered!(
+                            layer, Displacement,
+                            file: None, vertices: vertices.into(), values: values.into(),
+                            scale: number
+                        )
                     }
                 }
             },
@@ -171,63 +146,27 @@ fn layer() -> BoxedStrategy<Edit> {
                 })
             });
             let harmonic_order = ORDERS[order];
-            let (region, name, center) = (None, None, None);
+            let layer = Layer { features, region: None, fixed, fixed_region, muted };
             match kind {
-                0 => Edit::Translate(Translate {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    by: vector,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                1 => Edit::Rotate(Rotate {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    axis: [vector[0], vector[1], 1.0],
-                    degrees: number,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                2 => Edit::ScaleDirection(ScaleDirection {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    factors: vector,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                3 => Edit::ScaleNormals(ScaleNormals {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
-                    distance: number / 500.0,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
-                _ => Edit::Affine(Affine {
-                    features,
-                    region,
-                    fixed,
-                    fixed_region,
+                0 => layered!(layer, Translate, by: vector, harmonic_order: harmonic_order),
+                1 => layered!(
+                    layer, Rotate,
+                    axis: [vector[0], vector[1], 1.0], degrees: number, center: None,
+                    harmonic_order: harmonic_order
+                ),
+                2 => layered!(
+                    layer, ScaleDirection,
+                    factors: vector, center: None, harmonic_order: harmonic_order
+                ),
+                3 => layered!(
+                    layer, ScaleNormals,
+                    distance: number / 500.0, harmonic_order: harmonic_order
+                ),
+                _ => layered!(
+                    layer, Affine,
                     matrix: [[1.0, 0.0, vector[0]], [0.0, 1.0, vector[1]], [vector[2], 0.0, 1.0]],
-                    translation: vector,
-                    center,
-                    harmonic_order,
-                    muted,
-                    name,
-                }),
+                    translation: vector, center: None, harmonic_order: harmonic_order
+                ),
             }
         })
         .boxed()
