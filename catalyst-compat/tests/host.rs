@@ -518,3 +518,17 @@ fn what_the_blueprint_allows_is_taken_for_what_it_is() {
         assert_eq!(errors.matches(told).count(), 1, "{errors}");
     }
 }
+
+#[test]
+fn a_mesh_of_two_coordinates_stays_in_its_plane() {
+    let translate = |cycle: u64, by: [f64; 3]| {
+        let region = serde_json::json!({"box": {"lower": [-1, -1, -1], "upper": [0.5, 2, 1]}});
+        serde_json::json!({"at": {"cycle": cycle}, "order": {
+            "edits": [{"translate": {"region": region, "by": by}}], "schedule": {"steps": 1}}})
+    };
+    let orders = serde_json::json!([translate(1, [0.1, 0.0, 0.3]), translate(3, [0.1, 0.0, 0.0])]);
+    let (directory, pipelines, orders) = steered(&orders.to_string());
+    let program = compile(directory.path(), "plate", true);
+    let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders)]);
+    assert!(output.status.success(), "{errors}");
+}

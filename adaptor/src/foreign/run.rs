@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use tombolo_deform::communicator::{Alarm, Communicator};
+use tombolo_deform::communicator::{Alarm, Communicator, Reduction};
 use tombolo_deform::mesh::MeshView;
 use tombolo_pipelines::extract::{self, FieldView};
 
@@ -32,6 +32,8 @@ pub struct Run {
     adaptor: Adaptor,
     communicator: Arc<dyn Communicator>,
     kept: HashMap<String, Kept>,
+    /// The channels of which all ranks know how many coordinates a vertex has.
+    measured: HashSet<String>,
     /// The channel that orders change.
     steered: String,
     /// Its meshes and how many vertices each has.
@@ -62,6 +64,7 @@ impl Run {
             adaptor,
             communicator,
             kept: HashMap::new(),
+            measured: HashSet::new(),
             steered: String::new(),
             blocks: Vec::new(),
             last_time,
@@ -147,11 +150,6 @@ impl Run {
         self.adaptor.while_waiting(look);
     }
 
-    /// Rejects orders that leave the plane of a channel: see [`Adaptor::keep_in_plane`].
-    pub fn keep_in_plane(&mut self, channel: &str) {
-        self.adaptor.keep_in_plane(channel);
-    }
-
     /// The steering of the step that follows.
     #[must_use]
     pub fn asked(&self) -> &Asked {
@@ -217,6 +215,7 @@ impl Run {
         self.time_step = step.time_step;
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
+        self.keep_in_planes(&channels);
         // What is passed over can be new only where something was read.
         if may_tell {
             self.tell(&channels);
@@ -335,6 +334,27 @@ impl Run {
         Ok(())
     }
 
+    /// Rejects orders that leave the plane of a channel whose vertices have two coordinates: the solver
+    /// could not take the third of them ([`Adaptor::keep_in_plane`]). Collective, and for each channel
+    /// only until a rank has a vertex of it.
+    fn keep_in_planes(&mut self, channels: &[Channel<'_>]) {
+        for channel in channels {
+            if self.measured.contains(&channel.name) {
+                continue;
+            }
+            // What rank 0 says counts for the orders, but it may have no vertex of this channel.
+            let mut most = [channel.dimension() as u64];
+            self.communicator.reduce_integers(Reduction::Maximum, &mut most);
+            if most[0] == 0 {
+                continue;
+            }
+            if most[0] < 3 {
+                self.adaptor.keep_in_plane(&channel.name);
+            }
+            self.measured.insert(channel.name.clone());
+        }
+    }
+
     /// Says that the solver has failed on this rank, which shows no step any more: the others have
     /// it as an error of their next call, and do not wait for it. Then [`Run::finalize`] follows.
     /// Nothing where there is one rank.
@@ -368,5 +388,89 @@ impl Run {
                 ((**report).clone(), Err(error.into()))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tombolo_deform::communicator::threads;
+    use tombolo_deform::mesh::CellType;
+    use tombolo_pipelines::language;
+
+    use super::*;
+    use crate::foreign::array::{Array, NumberType};
+    use crate::foreign::mesh::{Coordset, Domain, Label, Mask, Roles, Topology};
+
+    /// A channel of quads; each array is one of the coordinates.
+    fn plate<'call>(axes: &[&'call [f64]], quads: &'call [i32]) -> Channel<'call> {
+        let axis = |values: &&'call [f64]| {
+            // SAFETY: a slice that is borrowed for as long as the array.
+            unsafe { Array::new(values.as_ptr().cast(), values.len(), 8, NumberType::F64, false) }
+        };
+        // SAFETY: as above.
+        let connectivity =
+            unsafe { Array::new(quads.as_ptr().cast(), quads.len(), 4, NumberType::I32, false) };
+        let label = Label::Words("channel 'plate'".into());
+        let domain = Domain {
+            coordset: Coordset::Explicit { axes: axes.iter().map(axis).collect() },
+            topology: Topology::Uniform {
+                cell_type: CellType::Quad,
+                connectivity,
+                label: label.clone(),
+            },
+            fields: Vec::new(),
+            faces: Vec::new(),
+            roles: Roles::default(),
+            label: label.clone(),
+        };
+        Channel {
+            name: "plate".into(),
+            label,
+            blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
+            ..Channel::default()
+        }
+    }
+
+    #[test]
+    fn a_plane_is_kept_where_rank_0_has_no_vertex() {
+        const SIDE: i32 = 5;
+        let x: Vec<f64> = (0..SIDE * SIDE).map(|vertex| f64::from(vertex % SIDE) / 4.0).collect();
+        let y: Vec<f64> = (0..SIDE * SIDE).map(|vertex| f64::from(vertex / SIDE) / 4.0).collect();
+        let low = (0..SIDE * (SIDE - 1)).filter(|vertex| vertex % SIDE < SIDE - 1);
+        let quads: Vec<i32> =
+            low.flat_map(|low| [low, low + 1, low + SIDE + 1, low + SIDE]).collect();
+        let order = r#"[{"at": {"cycle": 1}, "order": {"edits": [{"translate": {
+            "region": {"box": {"lower": [-1, -1, -1], "upper": [0.5, 2, 1]}}, "by": [0.1, 0, 0.3]}}]}}]"#;
+        let output = tempfile::tempdir().expect("a temporary directory");
+        let told = threads::run(2, |ranks| {
+            let rank = ranks.rank();
+            let mut run = Run::new(Settings {
+                communicator: Arc::new(ranks),
+                orders: language::check_orders(order, "orders").expect("orders"),
+                output: output.path().into(),
+                ..Settings::default()
+            })
+            .expect("begins");
+            for cycle in 0..4_u32 {
+                // Rank 0 has neither points nor cells, and says so in three coordinates.
+                let channel = if rank == 0 {
+                    plate(&[&[], &[], &[]], &[])
+                } else {
+                    plate(&[&x[..], &y[..]], &quads)
+                };
+                let step =
+                    Step { cycle: cycle.into(), time: 0.1 * f64::from(cycle), time_step: 0.1 };
+                let looked_at = run.looks_at(&step);
+                let given = Shown { step, looked_at, channels: vec![channel] };
+                assert!(run.execute(Ok(given)).expect("passes"));
+            }
+            let orders = serde_json::to_string(&run.orders()).expect("JSON");
+            drop(run.finalize());
+            orders
+        });
+        assert!(
+            told[0].contains("\"rejected\"") && told[0].contains("along z, expected 0"),
+            "{told:?}"
+        );
     }
 }

@@ -86,7 +86,8 @@ module tombolo
 
   procedure(tombolo_log_procedure), pointer :: log_procedure => null()
 
-  ! An array (2 or 3, points), or the two or three coordinates in an array each.
+  ! An array (2 or 3, points), or the two or three coordinates in an array each. With two of them orders that would move a vertex along
+  ! z are rejected.
   interface tombolo_points
     procedure points_real32, points_real64, axes_real32, axes_real64
   end interface

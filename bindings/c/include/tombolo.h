@@ -162,7 +162,8 @@ const char* tombolo_watching_link(tombolo* run);
 /* Points: x y z of each. */
 int tombolo_points_f32(tombolo* run, const char* channel, const float* points, size_t count);
 int tombolo_points_f64(tombolo* run, const char* channel, const double* points, size_t count);
-/* Points that lie otherwise: the addresses of the first x, y and, where the dimension is 3, z, and the bytes from one point to the next. */
+/* Points that lie otherwise: the addresses of the first x, y and, where the dimension is 3, z, and the bytes from one point to the next.
+ * Where the dimension is 2 on all ranks that have points, orders that would move a vertex along z are rejected. */
 int tombolo_points_strided(tombolo* run, const char* channel, enum tombolo_type type, const void* const* axes, int dimension,
   size_t count, ptrdiff_t stride);
 

@@ -140,6 +140,13 @@ fn a_solver_can_take_the_motion_of_the_boundary_alone() {
 }
 
 #[test]
+fn a_mesh_of_two_coordinates_stays_in_its_plane() {
+    let directory = installed();
+    let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/plate.c"));
+    succeed(Command::new(&program).current_dir(directory.path()));
+}
+
+#[test]
 fn a_refused_step_leaves_nothing_behind() {
     let directory = installed();
     let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/recovers.c"));

@@ -48,10 +48,7 @@ impl Channels<'_> {
     /// The name of each channel, and how many coordinates a vertex of it has.
     pub(crate) fn dimensions(&self) -> impl Iterator<Item = (&str, usize)> {
         let dimension = |channel: &Channel<'_>| {
-            channel.blocks.first().map_or(3, |block| match &block.domain.coordset {
-                Coordset::Explicit { axes } => axes.len(),
-                _ => 3,
-            })
+            channel.blocks.first().map_or(3, |block| block.domain.coordset.dimension())
         };
         self.0.iter().map(move |channel| (channel.name.as_str(), dimension(channel)))
     }

@@ -251,10 +251,6 @@ impl Run {
         for (channel, dimension) in given.iter().flat_map(Channels::dimensions) {
             if dimensions.get(channel) != Some(&dimension) {
                 dimensions.insert(channel.to_owned(), dimension);
-                // A motion along the third axis would be lost.
-                if dimension == 2 {
-                    run.keep_in_plane(channel);
-                }
             }
         }
         let given = step

@@ -76,7 +76,7 @@ fn uniform<'call>(node: &Node<'_, 'call>) -> Result<Coordset<'call>, RunError> {
     };
     let origin = vector(c"origin", AXES, 0.0)?;
     let spacing = vector(c"spacing", SPACINGS, 1.0)?;
-    Ok(Coordset::Uniform { points, origin, spacing })
+    Ok(Coordset::Uniform { points, origin, spacing, dimension })
 }
 
 /// The arrays `values/x`, `values/y`, `values/z`, as many as there are.

@@ -80,6 +80,12 @@ impl<'call> Channel<'call> {
         self.blocks.iter().map(Block::vertex_count).sum()
     }
 
+    /// How many coordinates a vertex has for the solver; 0 where there is no vertex.
+    pub(in crate::foreign) fn dimension(&self) -> usize {
+        let with_vertices = self.blocks.iter().filter(|block| block.vertex_count() > 0);
+        with_vertices.map(|block| block.domain.coordset.dimension()).max().unwrap_or(0)
+    }
+
     /// The one mesh that is lent as it is.
     pub(super) fn single(&self) -> Option<&Domain<'call>> {
         match self.blocks.as_slice() {

@@ -15,6 +15,8 @@ pub enum Coordset<'call> {
         origin: Vector,
         /// From one point to the next along each axis.
         spacing: Vector,
+        /// Along how many axes the solver has points.
+        dimension: usize,
     },
     /// A grid of steps that differ.
     Rectilinear {
@@ -38,6 +40,15 @@ impl<'call> Coordset<'call> {
                 Some(std::array::from_fn(|axis| axes.get(axis).map_or(1, Array::len)))
             }
             Coordset::Explicit { .. } => None,
+        }
+    }
+
+    /// How many coordinates a vertex has for the solver.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        match self {
+            Coordset::Uniform { dimension, .. } => *dimension,
+            Coordset::Rectilinear { axes } | Coordset::Explicit { axes } => axes.len(),
         }
     }
 
