@@ -191,6 +191,38 @@ int main(int argc, char** argv)
   expect("memory that was unmapped", impl->execute(&node), 100);
 
   step(&node);
+  text(&node, "catalyst/channels/uniform/type", "mesh");
+  mesh = at(&node, "catalyst/channels/uniform/data");
+  text(mesh, "coordsets/coords/type", "uniform");
+  for (const char* name = "ijk"; *name; ++name) {
+    char path[32];
+    snprintf(path, sizeof path, "coordsets/coords/dims/%c", *name);
+    integer(mesh, path, 0);
+  }
+  text(mesh, "topologies/mesh/type", "uniform");
+  text(mesh, "topologies/mesh/coordset", "coords");
+  text(&node, "catalyst/channels/structured/type", "mesh");
+  mesh = at(&node, "catalyst/channels/structured/data");
+  text(mesh, "coordsets/coords/type", "explicit");
+  text(mesh, "topologies/mesh/type", "structured");
+  text(mesh, "topologies/mesh/coordset", "coords");
+  for (int axis = 0; axis < 3; ++axis) {
+    char path[32];
+    snprintf(path, sizeof path, "coordsets/coords/values/%c", 'x' + axis);
+    array(mesh, path, FLOAT64, xyz, 0, 0, 0);
+    snprintf(path, sizeof path, "topologies/mesh/elements/dims/%c", 'i' + axis);
+    integer(mesh, path, 0);
+  }
+  expect("grids without points", impl->execute(&node), 0);
+  array(mesh, "coordsets/coords/values/x", FLOAT64, xyz, 0, 0, 0);
+  for (int axis = 0; axis < 3; ++axis) {
+    char path[48];
+    snprintf(path, sizeof path, "topologies/mesh/elements/dims/%c", 'i' + axis);
+    integer(mesh, path, 2);
+  }
+  expect("cells of a grid without points", impl->execute(&node), 100);
+
+  step(&node);
   expect("a sound step after all that", impl->execute(&node), 0);
   expect("results", impl->results(&empty), 0);
   expect("results say that nothing moves",

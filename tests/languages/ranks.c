@@ -91,6 +91,40 @@ static void drops(conduit_node* channels)
   conduit_node_set_path_char8_str(channel, "data/topologies/mesh/coordset", "coords");
 }
 
+/* Grids of each kind: one cube on ranks 0 and 1, and none on rank 2, which says so by counts of 0. */
+static void grids(conduit_node* channels)
+{
+  static const char* kinds[3] = { "uniform", "rectilinear", "structured" };
+  static const char* values[3] = { "values/x", "values/y", "values/z" };
+  static const char* counts[3] = { "elements/dims/i", "elements/dims/j", "elements/dims/k" };
+  const double ends[2] = { 0.0, 1.0 };
+  for (int kind = 0; kind < 3; ++kind) {
+    conduit_node* channel = conduit_node_fetch(channels, kinds[kind]);
+    conduit_node_set_path_char8_str(channel, "type", "mesh");
+    if (kind == 0) {
+      const int some[3] = { 2, 2, 2 }, none[3] = { 0, 0, 0 };
+      grid(channel, "data", rank < 2 ? some : none, 0.0, 1.0);
+      continue;
+    }
+    conduit_node* coords = conduit_node_fetch(channel, "data/coordsets/coords");
+    conduit_node* topology = conduit_node_fetch(channel, "data/topologies/mesh");
+    conduit_node_set_path_char8_str(coords, "type", kind == 1 ? "rectilinear" : "explicit");
+    conduit_node_set_path_char8_str(topology, "type", kinds[kind]);
+    conduit_node_set_path_char8_str(topology, "coordset", "coords");
+    for (int axis = 0; axis < 3; ++axis) {
+      if (kind == 2) {
+        double corners[8];
+        for (int v = 0; v < 8; ++v) corners[v] = ends[v >> axis & 1];
+        conduit_node_set_path_float64_ptr(coords, values[axis], corners, rank < 2 ? 8 : 0);
+        conduit_node_set_path_int32(topology, counts[axis], rank < 2);
+      } else {
+        /* Without points along x there are none, whatever the other axes have. */
+        conduit_node_set_path_float64_ptr(coords, values[axis], (double*)ends, rank == 2 && axis == 0 ? 0 : 2);
+      }
+    }
+  }
+}
+
 static double points[24];
 static const int32_t hex[8] = { 0, 1, 3, 2, 4, 5, 7, 6 };
 static double heat[8];
@@ -98,13 +132,16 @@ static double heat[8];
 /* Whether the channel's cubes are blocks. */
 static int has_blocks;
 
-/* Rank 2 has no cells, and does not even name the channel, or says no more than its type. */
+/* Rank 2 has no cells. It does not even name the channels but for the grids; of blocks it says no more than the channel's type. */
 static conduit_node* step(int cycle)
 {
   conduit_node* node = conduit_node_create();
   conduit_node_set_path_int32(node, "catalyst/state/timestep", cycle);
   conduit_node_set_path_float64(node, "catalyst/state/time", cycle);
-  if (rank == 2 && !has_blocks) return node;
+  if (rank == 2 && !has_blocks) {
+    grids(conduit_node_fetch(node, "catalyst/channels"));
+    return node;
+  }
   conduit_node* channel = conduit_node_fetch(node, "catalyst/channels/solid");
   conduit_node_set_path_char8_str(channel, "type", has_blocks ? "multimesh" : "mesh");
   if (rank == 2) return node;
@@ -128,6 +165,7 @@ static conduit_node* step(int cycle)
   levels(conduit_node_fetch(node, "catalyst/channels"));
   across(conduit_node_fetch(node, "catalyst/channels"));
   drops(conduit_node_fetch(node, "catalyst/channels"));
+  grids(conduit_node_fetch(node, "catalyst/channels"));
   return node;
 }
 

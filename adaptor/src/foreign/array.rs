@@ -126,6 +126,14 @@ impl<'call> Array<'call> {
         Self { first, count, stride, columns, number, swapped, call: PhantomData }
     }
 
+    /// No numbers.
+    #[must_use]
+    pub fn none(number: NumberType) -> Self {
+        let first = std::ptr::dangling();
+        // SAFETY: there is none of which anything is promised.
+        unsafe { Self::new(first, 0, number.bytes(), number, false) }
+    }
+
     /// The components of tuples as one list, where they lie in memory tuple after tuple without a gap:
     /// `x0 y0 z0 x1 y1 z1 ...`.
     pub(super) fn interleaved(components: &[Self]) -> Option<Self> {

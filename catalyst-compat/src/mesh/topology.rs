@@ -1,8 +1,8 @@
 //! Cells: of grids, of one shape, mixed, polygonal, polyhedral, points.
 
 use tombolo::deform::mesh::CellType;
-use tombolo::foreign::RunError;
 use tombolo::foreign::mesh::{Coordset, Label, Rows, Topology};
+use tombolo::foreign::{Array, NumberType, RunError};
 
 use super::coordset::counts;
 use super::rows;
@@ -44,6 +44,9 @@ pub(super) fn read<'call>(
                     "'structured' or 'unstructured'",
                 )
             })?;
+            if points.contains(&0) {
+                return Ok(empty_grid(node, coordset.dimension()));
+            }
             let cells = points.map(|count| count.saturating_sub(1));
             Ok(Topology::Grid { cells })
         }
@@ -51,6 +54,9 @@ pub(super) fn read<'call>(
             let elements = node.need(c"elements", "an object with 'dims'")?;
             let dims = elements.need(c"dims", "the number of cells along i, j, k")?;
             let (cells, dimension) = counts(&dims)?;
+            if coordset.vertex_count() == 0 && cells[..dimension].contains(&0) {
+                return Ok(empty_grid(node, dimension));
+            }
             let points = cells
                 .iter()
                 .try_fold(1_usize, |product, count| product.checked_mul(count.checked_add(1)?));
@@ -68,6 +74,19 @@ pub(super) fn read<'call>(
         "unstructured" => unstructured(node),
         other => Err(kind.wrong_found(format!("'{other}'"), KNOWN_TYPES)),
     }
+}
+
+/// No cells, of this dimension: the grid of a rank without points. The counts along its axes say
+/// nothing, as axes without cells do not count in a grid.
+fn empty_grid<'call>(node: &Node<'_, 'call>, dimension: usize) -> Topology<'call> {
+    let cell_type = match dimension {
+        0 => CellType::Vertex,
+        1 => CellType::Line,
+        2 => CellType::Quad,
+        _ => CellType::Hexahedron,
+    };
+    let connectivity = Array::none(NumberType::I32);
+    Topology::Uniform { cell_type, connectivity, label: Label::Path(node.path()) }
 }
 
 fn unstructured<'call>(node: &Node<'_, 'call>) -> Result<Topology<'call>, RunError> {
