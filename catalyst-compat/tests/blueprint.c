@@ -1,5 +1,6 @@
-/* Nodes that the Blueprint allows and that are easily taken for something else: a boundary whose map of shapes is the volume's, a map
- * that names polyhedra of which there are none, a field of materials alone, features and global numbers of vertices in several blocks.
+/* Nodes that the Blueprint allows and that are easily taken for something else: a boundary whose map of shapes is the volume's or that is
+ * in two topologies, a map that names polyhedra of which there are none, a field of materials alone, features and global numbers of
+ * vertices in several blocks.
  *
  *   cc -rdynamic blueprint.c -o blueprint -ldl -lm && TOMBOLO_ORDERS=orders.json ./blueprint libtombolo_catalyst.so pipelines.json
  *
@@ -69,6 +70,24 @@ static void features_of_vertices(conduit_node* mesh)
   array(mesh, "fields/features/values", INT32, of_vertices, 8, 0, 0);
 }
 
+/* The boundary in two topologies, each with a field of its own that says which features its faces belong to. */
+static void two_boundaries(conduit_node* mesh)
+{
+  static const char* names[2] = { "lower", "upper" };
+  for (int which = 0; which < 2; ++which) {
+    conduit_node* cells = topology(mesh, names[which]);
+    text(cells, "shape", "quad");
+    array(cells, "connectivity", INT32, sides + 4 * which, 4, 0, 0);
+    char path[64];
+    snprintf(path, sizeof path, "fields/%s_attribute/association", names[which]);
+    text(mesh, path, "element");
+    snprintf(path, sizeof path, "fields/%s_attribute/topology", names[which]);
+    text(mesh, path, names[which]);
+    snprintf(path, sizeof path, "fields/%s_attribute/values", names[which]);
+    array(mesh, path, INT32, tags + which, 1, 0, 0);
+  }
+}
+
 /* A field of a material's values, beside one that has its own. */
 static void materials(conduit_node* mesh)
 {
@@ -127,6 +146,12 @@ int main(int argc, char** argv)
   volume(mesh);
   features_of_vertices(mesh);
   steps(argv[2], "features of vertices");
+
+  mesh = at(&node, "catalyst/channels/box/data");
+  coordinates(mesh, 0);
+  volume(mesh);
+  two_boundaries(mesh);
+  steps(argv[2], "the boundary in two topologies");
 
   for (int which = 0; which < 2; ++which) {
     mesh = at(&node, which ? "catalyst/channels/box/data/right" : "catalyst/channels/box/data/left");

@@ -94,9 +94,13 @@ fn read_fields<'call>(
     let state = node.child(c"state");
     let metadata = state.as_ref().and_then(|state| state.child(c"metadata"));
     let told = metadata.as_ref().and_then(|metadata| metadata.child(c"vtk_fields"));
+    // The topologies of faces whose features are known: the first field that names them holds.
+    let mut tagged: Vec<&str> = Vec::new();
     fields.each(|field_node| {
-        if domain.faces.is_empty() {
-            domain.faces.extend(faces(field_node, main, others)?);
+        let other = faces_of(field_node, main, others)?;
+        if let Some(other) = other.filter(|other| !tagged.contains(&other.name.as_str())) {
+            domain.faces.push(faces(field_node, other)?);
+            tagged.push(&other.name);
         }
         let read = field::read(field_node, &main.name, vertices, elements, notes)?;
         let Some(field) = read else { return Ok(()) };
@@ -136,14 +140,14 @@ fn take_role<'call>(
     Ok(())
 }
 
-/// The faces whose features an element field names: one of integers, called `features`,
-/// `boundary_attribute` or `<topology>_attribute`, on a topology over the same coordinates whose
-/// cells are the faces of the main one's.
-fn faces<'call>(
+/// The topology whose faces' features an element field names: the field is called `features`,
+/// `boundary_attribute` or `<topology>_attribute`, and lies on a topology over the same coordinates
+/// whose cells are the faces of the main one's.
+fn faces_of<'a, 'call>(
     node: &Node<'_, 'call>,
     main: &Named,
-    others: &[Named<'call>],
-) -> Result<Option<Faces<'call>>, RunError> {
+    others: &'a [Named<'call>],
+) -> Result<Option<&'a Named<'call>>, RunError> {
     let Some(of) = node.child(c"topology") else { return Ok(None) };
     let of = of.text()?;
     let other = others.iter().find(|other| {
@@ -152,20 +156,24 @@ fn faces<'call>(
             && other.dimension == 2
             && main.dimension == 3
     });
-    let Some(other) = other else { return Ok(None) };
     let name = node.name();
-    if name != "features" && name != "boundary_attribute" && name != format!("{of}_attribute") {
-        return Ok(None);
-    }
+    let names_features =
+        name == "features" || name == "boundary_attribute" || name == format!("{of}_attribute");
+    Ok(other.filter(|_| names_features))
+}
+
+/// The faces of a topology, and the integers that say which feature each belongs to.
+fn faces<'call>(node: &Node<'_, 'call>, other: &Named<'call>) -> Result<Faces<'call>, RunError> {
     let values = node.need(c"values", "the number of each face's feature")?;
     let components = field::components(&values)?;
     match components.as_slice() {
         [tags] if tags.is_integer() && tags.len() == other.topology.cell_count() => {
-            Ok(Some(Faces { topology: other.topology.clone(), tags: *tags }))
+            Ok(Faces { topology: other.topology.clone(), tags: *tags })
         }
         _ => Err(values.wrong(format!(
-            "{} integers, one for each face of topology '{of}'",
-            other.topology.cell_count()
+            "{} integers, one for each face of topology '{}'",
+            other.topology.cell_count(),
+            other.name
         ))),
     }
 }
