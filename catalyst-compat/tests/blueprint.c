@@ -64,6 +64,29 @@ static void boundary(conduit_node* mesh)
   array(mesh, "fields/boundary_attribute/values", INT32, tags, 2, 0, 0);
 }
 
+/* A field of ones on a topology, in each of its cells. */
+static void field_of(conduit_node* mesh, const char* name, const char* of)
+{
+  char path[64];
+  snprintf(path, sizeof path, "fields/%s/association", name);
+  text(mesh, path, "element");
+  snprintf(path, sizeof path, "fields/%s/topology", name);
+  text(mesh, path, of);
+  snprintf(path, sizeof path, "fields/%s/values", name);
+  array(mesh, path, INT32, tags, 1, 0, 0);
+}
+
+/* A second volume and a line, each with a field: the cells are those of the first volume. */
+static void more_topologies(conduit_node* mesh)
+{
+  mixed(topology(mesh, "solid"), hexahedron, eight, 1, corners);
+  field_of(mesh, "stress", "solid");
+  conduit_node* cells = topology(mesh, "wire");
+  text(cells, "shape", "line");
+  array(cells, "connectivity", INT32, corners, 2, 0, 0);
+  field_of(mesh, "wire_attribute", "wire");
+}
+
 static void features_of_vertices(conduit_node* mesh)
 {
   text(mesh, "fields/features/association", "vertex");
@@ -151,7 +174,8 @@ int main(int argc, char** argv)
   coordinates(mesh, 0);
   volume(mesh);
   two_boundaries(mesh);
-  steps(argv[2], "the boundary in two topologies");
+  more_topologies(mesh);
+  steps(argv[2], "the boundary in two topologies, and others");
 
   for (int which = 0; which < 2; ++which) {
     mesh = at(&node, which ? "catalyst/channels/box/data/right" : "catalyst/channels/box/data/left");

@@ -514,6 +514,9 @@ fn what_the_blueprint_allows_is_taken_for_what_it_is() {
     for told in [
         "'catalyst/channels/box/data/fields/fraction' is passed over: it has values of materials alone",
         "catalyst/channels/box: the global numbers of several blocks are passed over",
+        "'catalyst/channels/box/data/topologies/solid' is passed over: the cells are those of topology 'volume'",
+        "'catalyst/channels/box/data/fields/stress' is passed over: it is one of topology 'solid'",
+        "'catalyst/channels/box/data/fields/wire_attribute' is passed over: it is one of topology 'wire'",
     ] {
         assert_eq!(errors.matches(told).count(), 1, "{errors}");
     }

@@ -71,6 +71,19 @@ pub(super) fn read<'call>(
         label: Label::Path(node.path()),
     };
     if with_fields {
+        // On a rank without cells the topologies may be in another order.
+        if domain.topology.cell_count() > 0 {
+            let passed_over = others.iter().filter(|other| {
+                other.dimension == main.dimension && other.topology.cell_count() > 0
+            });
+            notes.extend(passed_over.map(|other| {
+                let (path, cells) = (topologies.path(), &main.name);
+                format!(
+                    "'{path}/{}' is passed over: the cells are those of topology '{cells}'",
+                    other.name
+                )
+            }));
+        }
         read_fields(&mut domain, node, &main, &others, notes)?;
     }
     Ok(Some(domain))
@@ -101,6 +114,21 @@ fn read_fields<'call>(
         if let Some(other) = other.filter(|other| !tagged.contains(&other.name.as_str())) {
             domain.faces.push(faces(field_node, other)?);
             tagged.push(&other.name);
+            return Ok(());
+        }
+        if let Some(of) = field_node.child(c"topology")
+            && let of = of.text()?
+            && of != main.name
+        {
+            let other = others.iter().find(|other| other.name == of);
+            // Where there are no cells nothing is lost.
+            if elements > 0 && other.is_none_or(|other| other.topology.cell_count() > 0) {
+                let (path, cells) = (field_node.path(), &main.name);
+                notes.push(format!(
+                    "'{path}' is passed over: it is one of topology '{of}', and the cells are those of topology '{cells}'"
+                ));
+            }
+            return Ok(());
         }
         let read = field::read(field_node, &main.name, vertices, elements, notes)?;
         let Some(field) = read else { return Ok(()) };

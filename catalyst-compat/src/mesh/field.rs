@@ -28,8 +28,8 @@ pub(super) fn components<'call>(values: &Node<'_, 'call>) -> Result<Vec<Array<'c
     Ok(components)
 }
 
-/// Reads a field of this topology; `None` for one of another topology, or without values that could
-/// be shown, of which a note says so.
+/// Reads a field of this topology; `None` for one without values that could be shown, of which a note
+/// says so.
 pub(super) fn read<'call>(
     node: &Node<'_, 'call>,
     topology: &str,
@@ -37,11 +37,6 @@ pub(super) fn read<'call>(
     elements: usize,
     notes: &mut Vec<String>,
 ) -> Result<Option<Field<'call>>, RunError> {
-    if let Some(of) = node.child(c"topology")
-        && of.text()? != topology
-    {
-        return Ok(None);
-    }
     let Some(association_node) = node.child(c"association") else {
         // Coefficients of a basis, or of a material, are no values at vertices or in elements.
         if node.child(c"basis").is_some() || node.child(c"matset").is_some() {
