@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
-use tombolo::foreign::RunError;
+use tombolo::foreign::{RunError, declare};
 use tombolo::pipelines::language::{self, Config, Pipeline, Steering, StreamServer, TimedCommand};
 use tombolo::{ConfigurationFile, Parameter};
 
@@ -398,8 +398,7 @@ fn parameter(node: &Node<'_, '_>, parameters: &mut Vec<Parameter>) -> Result<(),
         ),
         _ => return Ok(()),
     };
-    parameters.push(Parameter { name, value, minimum, maximum });
-    Ok(())
+    Ok(declare(parameters, Parameter { name, value, minimum, maximum })?)
 }
 
 #[cfg(test)]

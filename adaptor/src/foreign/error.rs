@@ -4,7 +4,7 @@ use tombolo_deform::mesh::MeshError;
 use tombolo_pipelines::extract::ChannelError;
 use tombolo_pipelines::language::{LanguageErrors, ReadError};
 
-use crate::{CheckpointError, ExecuteError, FinalizeError, InitializeError};
+use crate::{CheckpointError, ExecuteError, FinalizeError, InitializeError, ParameterError};
 
 /// The subject of an error, by which a binding chooses its class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +72,9 @@ pub enum RunError {
     /// The configuration cannot be read.
     #[error("{0}")]
     Configuration(String),
+    /// A parameter that is declared makes no sense.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
     /// Another rank cannot go on.
     #[error("rank {rank}: {message}")]
     Rank {
@@ -140,7 +143,7 @@ impl RunError {
     pub fn kind(&self) -> Kind {
         match self {
             RunError::Rank { kind, .. } => *kind,
-            RunError::Configuration(_) => Kind::Configuration,
+            RunError::Configuration(_) | RunError::Parameter(_) => Kind::Configuration,
             RunError::Initialize(error) if error.is_mistake() => Kind::Configuration,
             RunError::Execute(error) if error.is_of_lent() => Kind::Mesh,
             RunError::Step { .. } | RunError::Execute(_) | RunError::Choices | RunError::Ending => {

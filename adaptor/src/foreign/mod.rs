@@ -7,6 +7,7 @@
 
 mod array;
 mod asked;
+mod declared;
 mod error;
 mod label;
 mod memory;
@@ -16,5 +17,6 @@ mod run;
 
 pub use array::{Array, NumberType, conduit_type};
 pub use asked::Asked;
+pub use declared::declare;
 pub use error::{Kind, RunError};
 pub use run::{Run, Shown};

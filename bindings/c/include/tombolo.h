@@ -141,7 +141,8 @@ int tombolo_orders_file(tombolo* run, const char* file);
 int tombolo_replay_file(tombolo* run, const char* file);
 /* The directory of files that pipelines write; else the current one. */
 int tombolo_output(tombolo* run, const char* directory);
-/* A number that can be steered, within its bounds. */
+/* A number that can be steered, within its bounds, which are finite. One that makes no sense, or whose name was declared before, is
+ * refused here and not kept. */
 int tombolo_parameter(tombolo* run, const char* name, double value, double minimum, double maximum);
 /* What a feature of the mesh is to the flow: TOMBOLO_INFLOW, TOMBOLO_OUTFLOW or TOMBOLO_WALL. Viewers hold inflow and outflow still until
  * somebody wants otherwise. */

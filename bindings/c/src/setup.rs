@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::ptr;
 use std::sync::Arc;
 
-use tombolo::foreign::{Run, RunError, ranks};
+use tombolo::foreign::{Run, RunError, declare, ranks};
 use tombolo::pipelines::language;
 use tombolo::{Condition, Parameter, Restart, Settings};
 
@@ -91,8 +91,7 @@ export! {
     fn tombolo_parameter(run: *mut Handle, parameter: Text, value: f64, minimum: f64, maximum: f64) {
         let name = parameter.name("the parameter's name")?;
         set(run, |settings| {
-            settings.parameters.push(Parameter { name, value, minimum, maximum });
-            Ok(())
+            Ok(declare(&mut settings.parameters, Parameter { name, value, minimum, maximum })?)
         })
     }
 

@@ -16,7 +16,6 @@ static void expect(int line, int status, int expected, const char* words)
 }
 #define OK(call) expect(__LINE__, call, TOMBOLO_OK, "")
 #define INVALID(call, words) expect(__LINE__, call, TOMBOLO_INVALID, words)
-#define FAILED(call, words) expect(__LINE__, call, TOMBOLO_FAILED, words)
 #define WRONG(call, words) expect(__LINE__, call, TOMBOLO_WRONG_CALL, words)
 /* Of a function that answers with something else than a status: what it answers where it is wrong. */
 #define NONE(call, words) expect(__LINE__, (call) ? -1 : TOMBOLO_INVALID, TOMBOLO_INVALID, words)
@@ -195,8 +194,16 @@ static void pointers_and_times(void)
   OK(tombolo_close(&run));
   OK(tombolo_open(NULL, TOMBOLO_COMM_WORLD, &run));
   OK(tombolo_parameter(run, "same", 1.0, 0.0, 1.0));
-  OK(tombolo_parameter(run, "same", 1.0, 0.0, 1.0));
-  FAILED(tombolo_start(run), "same");
+  INVALID(tombolo_parameter(run, "same", 1.0, 0.0, 1.0), "parameter 'same' is declared twice");
+  INVALID(tombolo_parameter(run, "p", 50.0, 0.0, 40.0), "parameter 'p' cannot be 50; it must be a number from 0 to 40");
+  INVALID(tombolo_parameter(run, "p", NAN, 0.0, 40.0), "parameter 'p' cannot be NaN");
+  INVALID(tombolo_parameter(run, "p", 5.0, 40.0, 0.0), "parameter 'p' has the bounds 40 and 0");
+  INVALID(tombolo_parameter(run, "p", 5.0, 0.0, INFINITY), "parameter 'p' has the bounds 0 and");
+  /* What was refused was not kept: the run begins, and has the parameters that were declared rightly. */
+  OK(tombolo_parameter(run, "p", 5.0, 0.0, 40.0));
+  OK(tombolo_start(run));
+  OK(tombolo_parameter_value(run, "p", &value));
+  NONE(value != 5.0, "");
   OK(tombolo_close(&run));
 }
 
