@@ -56,7 +56,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use error::{CatalystError, Status};
 use host::{Host, RawNode};
 use node::{Node, NodeMut};
-use session::Session;
+use session::{Session, SetUp};
 
 /// One function of the table.
 type Call = unsafe extern "C" fn(*const RawNode) -> c_int;
@@ -103,14 +103,24 @@ unsafe extern "C" fn initialize(params: *const RawNode) -> c_int {
         // SAFETY: the caller of a Catalyst function hands over null or a live node of the host's
         // Conduit.
         let node = unsafe { Node::root(host, params) }?;
-        // The one before ends first, with its server.
+        // What cannot be read ends nothing.
+        let set_up = SetUp::read(&node)?;
+        // The one before ends first, with its server. What was not written then is told, but is no
+        // reason to have no run.
         let before = session().take();
-        if let Some(before) = before {
-            before.finalize()?;
+        let ended = before.map_or(Ok(()), Session::finalize);
+        match Session::new(set_up) {
+            Ok(new) => {
+                *session() = Some(new);
+                Ok(ended?)
+            }
+            Err(error) => {
+                if let Err(of_before) = ended {
+                    eprintln!("tombolo: catalyst_initialize: {of_before}");
+                }
+                Err(error.into())
+            }
         }
-        let new = Session::new(&node)?;
-        *session() = Some(new);
-        Ok(())
     })
 }
 

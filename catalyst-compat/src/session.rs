@@ -32,14 +32,30 @@ enum Stage {
     UnderWay(Box<Run>),
 }
 
-impl Session {
-    /// Sets a run up. Collective.
-    pub(crate) fn new(node: &Node<'_, '_>) -> Result<Self, RunError> {
+/// What a run is to begin with, which all ranks can read. It is known before anything is done, so that a
+/// run before is ended only for one that can be described.
+pub(crate) struct SetUp {
+    communicator: Arc<dyn Communicator>,
+    configuration: Configuration,
+}
+
+impl SetUp {
+    /// Reads the node of `catalyst_initialize`. Collective.
+    pub(crate) fn read(node: &Node<'_, '_>) -> Result<Self, RunError> {
         // First, and by itself: what else is wrong on one rank is told by the communicator of all.
         let handle = configuration::communicator(node)?;
         // SAFETY: Catalyst's blueprint says that `catalyst/mpi_comm` is the handle of a live
         // communicator.
         let communicator = unsafe { ranks::communicator(handle) }?;
+        let configuration = ranks::agree(&*communicator, Configuration::read(node))?;
+        Ok(Self { communicator, configuration })
+    }
+}
+
+impl Session {
+    /// Sets a run up. Collective.
+    pub(crate) fn new(set_up: SetUp) -> Result<Self, RunError> {
+        let SetUp { communicator, configuration } = set_up;
         let Configuration {
             config,
             is_default,
@@ -50,7 +66,7 @@ impl Session {
             file,
             restart,
             notes,
-        } = ranks::agree(&*communicator, Configuration::read(node))?;
+        } = configuration;
         let settings = Settings {
             config,
             communicator: Arc::clone(&communicator),
@@ -92,7 +108,7 @@ impl Session {
     pub(crate) fn execute(&mut self, node: &Node<'_, '_>) -> Result<(), RunError> {
         let _alarm = Alarm::among(&self.communicator);
         let mut given = self.read(node);
-        if let Stage::Waiting { settings, .. } = &mut self.stage {
+        if let Stage::Waiting { settings, .. } = &self.stage {
             let shown = ranks::agree(&*self.communicator, given)?;
             let own: Vec<&str> =
                 shown.channels.iter().map(|channel| channel.name.as_str()).collect();
@@ -101,8 +117,10 @@ impl Session {
             if names.is_empty() {
                 return Ok(());
             }
-            settings.config = with_default_views(&settings.config, &names)?;
-            let run = match Run::new((**settings).clone()) {
+            // Nothing of a start that fails is kept: the next step tries it again from the same.
+            let config = with_default_views(&settings.config, &names)?;
+            let mut settings = Settings { config, ..(**settings).clone() };
+            let run = match Run::new(settings.clone()) {
                 // Nobody asked for that very port. On several ranks all have the error of the one
                 // that could not have it.
                 Err(RunError::Initialize(
@@ -114,7 +132,7 @@ impl Session {
                         address.set_port(0);
                         stream.listen = Some(Listen::Address(address));
                     }
-                    Run::new((**settings).clone())?
+                    Run::new(settings)?
                 }
                 run => run?,
             };
@@ -243,8 +261,7 @@ impl Session {
             && let Some(file) = configuration::report_file()
         {
             let text = serde_json::to_string_pretty(&report).unwrap_or_default();
-            told = std::fs::write(&file, text)
-                .map_err(|error| RunError::Configuration(format!("{file}: {error}")));
+            told = std::fs::write(&file, text).map_err(|source| RunError::Report { file, source });
         }
         // No rank goes on before the files are there.
         ranks::agree(&*self.communicator, ended.and(told))

@@ -535,3 +535,24 @@ fn a_mesh_of_two_coordinates_stays_in_its_plane() {
     let (output, errors) = run(&program, Some(&pipelines), &[("TOMBOLO_ORDERS", &orders)]);
     assert!(output.status.success(), "{errors}");
 }
+
+#[test]
+fn a_start_or_an_end_that_fails_leaves_what_it_should() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let pipelines = directory.path().join("pipelines.json");
+    std::fs::write(&pipelines, QUALITY).expect("a file");
+    let program = compile(directory.path(), "starts", true);
+    let output_directory = directory.path().to_string_lossy().into_owned();
+    let (output, errors) =
+        run(&program, Some(&pipelines), &[("TOMBOLO_OUTPUT", &output_directory)]);
+    assert!(output.status.success(), "{errors}");
+    assert!(
+        errors.contains("parameter 'inflow' cannot be 50; it must be a number from 0 to 40"),
+        "{errors}"
+    );
+    let report = std::fs::read_to_string(directory.path().join("pipelines.json.report"));
+    let report: serde_json::Value = serde_json::from_str(&report.expect("a report")).expect("JSON");
+    let pipelines = report["pipelines"].as_array().expect("a list");
+    let names: Vec<_> = pipelines.iter().map(|pipeline| &pipeline["name"]).collect();
+    assert_eq!(names, ["surface"], "one default view, however many starts have failed");
+}

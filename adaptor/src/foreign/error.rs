@@ -113,6 +113,14 @@ pub enum RunError {
     /// Something was not written.
     #[error(transparent)]
     Finalize(#[from] FinalizeError),
+    /// The report of the run was not written.
+    #[error("the report {file}: {source}")]
+    Report {
+        /// Its file.
+        file: String,
+        /// The reason.
+        source: std::io::Error,
+    },
 }
 
 impl From<LanguageErrors> for RunError {
@@ -162,6 +170,7 @@ impl RunError {
             RunError::Initialize(_)
             | RunError::Finalize(_)
             | RunError::Checkpoint(_)
+            | RunError::Report { .. }
             | RunError::Left(_) => true,
             _ => false,
         }
