@@ -145,9 +145,7 @@ impl Session {
             Stage::UnderWay(run) => {
                 let checkpoint = checkpoint_file(node);
                 run.execute(given).map_err(at_path)?;
-                let path = "catalyst/state/checkpoint";
-                let checkpoint = ranks::agree_on(&*self.communicator, checkpoint, path)?;
-                checkpoint.map_or(Ok(()), |file| run.checkpoint(&file))
+                run.checkpoint(checkpoint, "catalyst/state/checkpoint")
             }
             Stage::Waiting { .. } => Ok(()),
         }

@@ -45,6 +45,17 @@ int main(int argc, char** argv)
   EXPECT(tombolo_feature(run, "solid", 3, "far"), NULL);
   if (rank == 1) EXPECT(tombolo_feature(run, "solid", 4, "lost"), NULL);
   EXPECT(tombolo_execute(run, 0, 0.0, 0.1), "feature 'lost' has the number 4, which no face has; the faces have 1, 2, 3");
+  /* A text that one rank alone gets wrong holds none up. */
+  if (rank == 0) {
+    if (tombolo_checkpoint(run, NULL) != TOMBOLO_WRONG_CALL || !strstr(tombolo_message(), "file is a null pointer")) ++wrong;
+    if (tombolo_release_shape(run, NULL) != TOMBOLO_WRONG_CALL) ++wrong;
+  } else {
+    EXPECT(tombolo_checkpoint(run, "ranks.state"), "rank 0: file is a null pointer");
+    EXPECT(tombolo_release_shape(run, "another mesh"), "rank 0: the reason is a null pointer");
+  }
+  EXPECT(tombolo_checkpoint(run, rank == 1 ? "other.state" : "ranks.state"), "'file': found another one on other ranks, or none");
+  EXPECT(tombolo_release_shape(run, rank == 2 ? "" : "another mesh"), "the reason: found \"\"");
+  EXPECT(tombolo_release_shape(run, "another mesh"), NULL);
   EXPECT(tombolo_close(&run), NULL);
   int all = 0;
   MPI_Allreduce(&wrong, &all, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);

@@ -106,12 +106,25 @@ impl Run {
         self.kept.get(&channel.name).is_none_or(|kept| !kept.suffices(channel))
     }
 
-    /// Saves the state of the run in a file: see [`Adaptor::write_checkpoint`]. Collective.
+    /// Saves the state of the run in a file, if one is named: see [`Adaptor::write_checkpoint`].
+    /// Collective.
+    ///
+    /// `file` is what the solver names, or why it cannot be read; errors call it `what`. It is agreed
+    /// upon first: a rank whose own is wrong would leave the others waiting.
     ///
     /// # Errors
-    /// [`RunError::Checkpoint`].
-    pub fn checkpoint(&mut self, file: &str) -> Result<(), RunError> {
-        Ok(self.adaptor.write_checkpoint(file)?)
+    /// The mistake in what is named, on any rank, or [`RunError::Wrong`] where ranks name others; then
+    /// nothing is saved on any rank. [`RunError::Checkpoint`].
+    pub fn checkpoint(
+        &mut self,
+        file: Result<Option<String>, RunError>,
+        what: &str,
+    ) -> Result<(), RunError> {
+        let _alarm = self.alarm();
+        match ranks::agree_on(&*self.communicator, file, what)? {
+            Some(file) => Ok(self.adaptor.write_checkpoint(file)?),
+            None => Ok(()),
+        }
     }
 
     /// The link that a viewer opens, with the secret of those who may drive.
@@ -126,9 +139,17 @@ impl Run {
         self.adaptor.watching_link()
     }
 
-    /// Ends the steering of the shape: see [`Adaptor::release_shape`]. To be called on all ranks.
-    pub fn release_shape(&mut self, reason: &str) {
-        self.adaptor.release_shape(reason);
+    /// Ends the steering of the shape: see [`Adaptor::release_shape`]. Collective.
+    ///
+    /// `reason` is what the solver says, or why that cannot be read.
+    ///
+    /// # Errors
+    /// The mistake in what is said, on any rank; then the shape is steered as before on all.
+    pub fn release_shape(&mut self, reason: Result<String, RunError>) -> Result<(), RunError> {
+        let _alarm = self.alarm();
+        let reason = ranks::agree(&*self.communicator, reason)?;
+        self.adaptor.release_shape(&reason);
+        Ok(())
     }
 
     /// Asks the solver to end, from any thread.
@@ -429,6 +450,41 @@ mod tests {
             blocks: vec![Block { name: String::new(), domain, mask: Mask::default() }],
             ..Channel::default()
         }
+    }
+
+    #[test]
+    fn a_text_that_one_rank_gets_wrong_is_an_error_on_all() {
+        let output = tempfile::tempdir().expect("a temporary directory");
+        let file = output.path().join("run.state");
+        let told = threads::run(2, |ranks| {
+            let rank = ranks.rank();
+            let settings = Settings {
+                communicator: Arc::new(ranks),
+                output: output.path().into(),
+                ..Settings::default()
+            };
+            let mut run = Run::new(settings).expect("begins");
+            let given = |text: &str| {
+                if rank == 0 {
+                    Err(RunError::Configuration("no text".into()))
+                } else {
+                    Ok(text.into())
+                }
+            };
+            let saved = run.checkpoint(given(&file.to_string_lossy()).map(Some), "file");
+            let other = run.checkpoint(Ok((rank == 0).then(|| "other".to_owned())), "file");
+            let released = run.release_shape(given("another mesh"));
+            drop(run.finalize());
+            [saved, other, released].map(|done| done.map_err(|error| error.to_string()))
+        });
+        let refused = |words: &str| Err(words.to_owned());
+        let other = "'file': found another one on other ranks, or none; expected the same on all";
+        assert_eq!(told[0], [refused("no text"), refused(other), refused("no text")]);
+        assert_eq!(
+            told[1],
+            [refused("rank 0: no text"), refused(other), refused("rank 0: no text")]
+        );
+        assert!(!file.exists());
     }
 
     #[test]

@@ -22,7 +22,8 @@
  *
  * Ranks. On several ranks of MPI all call tombolo_open, tombolo_restart, tombolo_replay_file, tombolo_start, tombolo_execute,
  * tombolo_checkpoint, tombolo_release_shape, tombolo_finalize and tombolo_close, for the same cycle and with the same files; an error of
- * one rank is that of all.
+ * one rank is that of all. What one rank alone gives wrongly to tombolo_open, tombolo_checkpoint or
+ * tombolo_release_shape holds none up: nothing is done on any.
  *
  * Threads. One thread at a time uses a run; another is answered with TOMBOLO_WRONG_CALL, and so is whoever uses a run that was closed.
  * Any thread may call tombolo_stop and tombolo_stopped, also while another is in a call. */

@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_uint};
 use std::ptr;
 
 use tombolo::deform::mesh::Vector;
-use tombolo::foreign::{RunError, Shown};
+use tombolo::foreign::{Run, RunError, Shown};
 use tombolo::pipelines::language::nearest;
 use tombolo::{ExecuteError, MeshMotion, OrderReport, Step};
 
@@ -47,6 +47,28 @@ fn check_cycle(cycle: u64) -> Result<(), RunError> {
     }
 }
 
+/// Does something that all ranks do together with a text that each is given. One whose own makes no
+/// sense says so to the others, which would wait for it, and is answered for its own mistake.
+fn on_all(
+    run: *mut Handle,
+    text: Result<String, Fault>,
+    call: impl FnOnce(&mut Run, Result<String, RunError>) -> Result<(), RunError>,
+) -> Result<(), Fault> {
+    with(run, |run| {
+        run.under_way()?;
+        let (told, wrong_call) = match text {
+            Ok(text) => (Ok(text), None),
+            Err(Fault::Error(error)) => (Err(error), None),
+            Err(Fault::Call(message)) => {
+                (Err(RunError::Configuration(message.clone())), Some(message))
+            }
+        };
+        let done = call(run.begin()?, told);
+        wrong_call.map_or(Ok(()), |message| Err(Fault::Call(message)))?;
+        Ok(done?)
+    })
+}
+
 export! {
     fn tombolo_execute(run: *mut Handle, cycle: u64, time: f64, time_step: f64) {
         with(run, |run| {
@@ -75,14 +97,7 @@ export! {
     }
 
     fn tombolo_checkpoint(run: *mut Handle, file: Text) {
-        let file = file.get("file")?;
-        with(run, |run| {
-            run.not_ended()?;
-            match &mut run.stage {
-                Stage::UnderWay(under_way) => Ok(under_way.checkpoint(&file)?),
-                _ => Err(Fault::Call("called before the run began, by tombolo_start or the first tombolo_execute".into())),
-            }
-        })
+        on_all(run, file.get("file"), |run, file| run.checkpoint(file.map(Some), "file"))
     }
 
     fn tombolo_coordinates(run: *mut Handle) -> (*const f64 = ptr::null()) {
@@ -150,12 +165,7 @@ export! {
     }
 
     fn tombolo_release_shape(run: *mut Handle, reason: Text) {
-        let reason = reason.name("the reason")?;
-        with(run, |run| {
-            run.under_way()?;
-            run.begin()?.release_shape(&reason);
-            Ok(())
-        })
+        on_all(run, reason.name("the reason"), Run::release_shape)
     }
 
     fn tombolo_stop(run: *mut Handle) {
