@@ -16,6 +16,9 @@ use crate::{Adaptor, FinalizeError, OrderReport, Report, Settings, Step, Stopper
 /// Why orders are rejected from then on.
 const OTHER_MESH: &str = "the solver has made another mesh: shapes are measured from the mesh of the first step, so its cells must stay the same";
 
+/// Why orders are rejected once their channel is no longer shown.
+const NO_MESH: &str = "the solver no longer shows the mesh that orders change";
+
 /// A step as the solver shows it.
 pub struct Shown<'call> {
     /// Its cycle, time and length.
@@ -237,6 +240,11 @@ impl Run {
         self.last_time = Some(step.time);
         self.complete(&mut channels)?;
         self.keep_in_planes(&channels);
+        let replaced = if self.loses_steered(&mut channels) {
+            Some(NO_MESH)
+        } else {
+            is_other.then_some(OTHER_MESH)
+        };
         // What is passed over can be new only where something was read.
         if may_tell {
             self.tell(&channels);
@@ -258,10 +266,9 @@ impl Run {
             .map(|((channel, mesh), fields)| extract::Channel { name: &channel.name, mesh, fields })
             .collect();
         // The shape is let go of only with a mesh that passes: one that is refused changes nothing.
-        let steering = if is_other {
-            adaptor.execute_replaced(&step, &views, OTHER_MESH)
-        } else {
-            adaptor.execute(&step, &views)
+        let steering = match replaced {
+            Some(reason) => adaptor.execute_replaced(&step, &views, reason),
+            None => adaptor.execute(&step, &views),
         };
         asked.take(&steering?);
         for channel in &channels {
@@ -353,6 +360,22 @@ impl Run {
             });
         }
         Ok(())
+    }
+
+    /// Keeps the channel that orders change, where nothing names it, as the first, which it was in the
+    /// first step: another one must not be taken for it. Says whether the solver no longer shows it
+    /// while it shows others.
+    fn loses_steered(&self, channels: &mut [Channel<'_>]) -> bool {
+        if self.steered.is_empty() || self.adaptor.steered_channel().is_some() {
+            return false;
+        }
+        match channels.iter().position(|channel| channel.name == self.steered) {
+            Some(place) => {
+                channels[..=place].rotate_right(1);
+                false
+            }
+            None => !channels.is_empty(),
+        }
     }
 
     /// Rejects orders that leave the plane of a channel whose vertices have two coordinates: the solver

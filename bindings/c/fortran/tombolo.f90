@@ -76,7 +76,7 @@ module tombolo
   public :: tombolo_checkpoint, tombolo_restart, tombolo_replay_file, tombolo_release_shape, tombolo_stop
   public :: tombolo_condition, tombolo_start, tombolo_link, tombolo_watching_link, tombolo_finalize, tombolo_close, tombolo_report
   public :: tombolo_points, tombolo_cells, tombolo_mixed_cells, tombolo_point_cells, tombolo_ghost_cells
-  public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field
+  public :: tombolo_faces, tombolo_feature, tombolo_global_vertices, tombolo_global_cells, tombolo_field, tombolo_forget
   public :: tombolo_execute, tombolo_coordinates, tombolo_displacement, tombolo_velocity
   public :: tombolo_surface_vertices, tombolo_surface_coordinates, tombolo_surface_displacement, tombolo_surface_velocity
   public :: tombolo_motion_order, tombolo_motion_shape, tombolo_parameter_value, tombolo_stopped
@@ -86,8 +86,8 @@ module tombolo
 
   procedure(tombolo_log_procedure), pointer :: log_procedure => null()
 
-  ! An array (2 or 3, points), or the two or three coordinates in an array each. With two of them orders that would move a vertex along
-  ! z are rejected.
+  ! An array (2 or 3, points), or the two or three coordinates in an array each. With two of them orders that would move a vertex
+  ! along z are rejected.
   interface tombolo_points
     procedure points_real32, points_real64, axes_real32, axes_real64
   end interface
@@ -362,6 +362,13 @@ module tombolo
       import :: c_char, c_int, c_ptr
       type(c_ptr), value :: run
       character(kind=c_char), intent(in) :: channel(*)
+      integer(c_int) :: status
+    end function
+    function c_forget(run, channel, name) bind(C, name="tombolo_forget") result(status)
+      import :: c_char, c_int, c_ptr
+      type(c_ptr), value :: run
+      character(kind=c_char), intent(in) :: channel(*)
+      type(c_ptr), value :: name
       integer(c_int) :: status
     end function
     function c_ghost_cells(run, channel, ghosts, cells) bind(C, name="tombolo_ghost_cells") result(status)
@@ -993,6 +1000,21 @@ contains
     type(tombolo_run), intent(in) :: run
     character(len=*), intent(in) :: channel
     status = c_point_cells(run%handle, c_text(channel))
+  end function
+
+  ! Forgets a field of this name, or the array "ghost_cells", "global_vertices" or "global_cells": to be called before the solver
+  ! deallocates it. Without a name it forgets the whole channel.
+  integer(c_int) function tombolo_forget(run, channel, name) result(status)
+    type(tombolo_run), intent(in) :: run
+    character(len=*), intent(in) :: channel
+    character(len=*), intent(in), optional :: name
+    character(kind=c_char, len=:), allocatable, target :: text
+    if (present(name)) then
+      text = c_text(name)
+      status = c_forget(run%handle, c_text(channel), c_loc(text))
+    else
+      status = c_forget(run%handle, c_text(channel), c_null_ptr)
+    end if
   end function
 
   integer(c_int) function tombolo_ghost_cells(run, channel, ghosts) result(status)

@@ -15,7 +15,7 @@
  * may go on; the mesh stays over a step that tombolo_execute has refused.
  *
  * Arrays are lent, not copied. They are named once, and again where an array has moved in memory; those that were named last are
- * read inside tombolo_execute and at no other time. Each count is one of points, cells or faces, never of numbers or bytes. Counts
+ * read inside tombolo_execute and at no other time, until tombolo_forget. Each count is one of points, cells or faces, never of numbers or bytes. Counts
  * that do not fit together are an error of tombolo_execute.
  *
  * Texts that are answered belong to the run and are never cut; each function says how long they are valid.
@@ -215,6 +215,13 @@ int tombolo_field_u8(tombolo* run, const char* channel, const char* name, enum t
 /* A field that lies otherwise: the address of the first value of each component, and the bytes from one vertex or cell to the next. */
 int tombolo_field_strided(tombolo* run, const char* channel, const char* name, enum tombolo_association association,
   enum tombolo_type type, const void* const* components, int component_count, size_t count, ptrdiff_t stride);
+
+/* ---- What is gone. */
+
+/* Forgets a field of this name, or the array "ghost_cells", "global_vertices" or "global_cells" of a channel, which the solver has freed or
+ * has no more: it is not read again. NULL forgets the whole channel, which is there again once tombolo_points names it; features that
+ * tombolo_execute has shown keep their names. Orders are rejected once the channel that they change is not shown any more. */
+int tombolo_forget(tombolo* run, const char* channel, const char* name);
 
 /* ---- Each step. */
 

@@ -22,19 +22,18 @@ fn lend(
     with(run, |run| {
         run.not_ended()?;
         let channel = channel.get("the channel's name")?;
-        if let Some(known) = run.channels.iter_mut().find(|known| known.name == channel) {
+        let mut there = run.channels.iter_mut().filter(|known| !known.is_forgotten);
+        if let Some(known) = there.find(|known| known.name == channel) {
             return change(known, &format!("channel '{channel}'"));
         }
-        let names = run.channels.iter().map(|known| known.name.as_str());
-        let expected = match nearest(&channel, names.clone()) {
+        let there = run.channels.iter().filter(|known| !known.is_forgotten);
+        let names: Vec<&str> = there.map(|known| known.name.as_str()).collect();
+        let expected = match nearest(&channel, names.iter().copied()) {
             Some(near) => format!("one that tombolo_points has named; did you mean '{near}'?"),
-            None if run.channels.is_empty() => {
+            None if names.is_empty() => {
                 "one that tombolo_points has named; none has been yet".into()
             }
-            None => format!(
-                "one that tombolo_points has named: {}",
-                names.collect::<Vec<_>>().join(", ")
-            ),
+            None => format!("one that tombolo_points has named: {}", names.join(", ")),
         };
         Err(Fault::invalid("channel", format!("'{channel}'"), expected))
     })
@@ -51,7 +50,7 @@ fn lend_points(
         let channel = channel.name("the channel's name")?;
         let points = points(&format!("channel '{channel}', points"))?;
         match run.channels.iter_mut().find(|known| known.name == channel) {
-            Some(known) => known.points = points,
+            Some(known) => known.points(points),
             None => run.channels.push(Named::new(channel, points)),
         }
         Ok(())
@@ -164,6 +163,16 @@ export! {
 
     fn tombolo_feature(run: *mut Handle, channel: Text, number: i64, feature: Text) {
         lend(run, channel, |named, _| named.feature(number, feature.name("the feature's name")?))
+    }
+
+    fn tombolo_forget(run: *mut Handle, channel: Text, name: Text) {
+        lend(run, channel, |named, _| {
+            if name.is_null() {
+                named.forget_all();
+                return Ok(());
+            }
+            named.forget(&name.get("the name of what to forget")?)
+        })
     }
 
     fn tombolo_ghost_cells(run: *mut Handle, channel: Text, ghosts: *const u8, cells: usize) {

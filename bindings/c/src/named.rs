@@ -6,6 +6,7 @@ use tombolo::foreign::mesh::{
 };
 use tombolo::foreign::{Array, RunError};
 use tombolo::pipelines::extract::{Association, check_field_length};
+use tombolo::pipelines::language::nearest;
 
 use crate::Fault;
 use crate::lent::Address;
@@ -27,7 +28,7 @@ pub(super) enum Cells {
 #[derive(Debug, Default)]
 pub(super) struct Named {
     pub(super) name: String,
-    pub(super) points: Vec<Address>,
+    points: Vec<Address>,
     cells: Option<Cells>,
     /// Of each type of face one array.
     faces: Vec<(CellType, Address, Address)>,
@@ -38,7 +39,15 @@ pub(super) struct Named {
     pub(super) global_cells: Option<Address>,
     /// Whether `tombolo_execute` has shown it.
     pub(super) is_shown: bool,
+    /// Whether it was forgotten. Its name keeps its place among those of the others, and its features
+    /// keep theirs, for when it is named again.
+    pub(super) is_forgotten: bool,
 }
+
+/// Arrays of a channel other than its fields, as they are forgotten by name.
+const GHOST_CELLS: &str = "ghost_cells";
+const GLOBAL_VERTICES: &str = "global_vertices";
+const GLOBAL_CELLS: &str = "global_cells";
 
 impl Named {
     pub(super) fn new(name: String, points: Vec<Address>) -> Self {
@@ -95,6 +104,50 @@ impl Named {
     ) {
         self.fields.retain(|(known, ..)| *known != name);
         self.fields.push((name, association, components));
+    }
+
+    /// Names the points, by which a channel that was forgotten is there again.
+    pub(super) fn points(&mut self, points: Vec<Address>) {
+        self.points = points;
+        self.is_forgotten = false;
+    }
+
+    /// Forgets all arrays: none is read any more.
+    pub(super) fn forget_all(&mut self) {
+        let Self { name, features, is_shown, .. } = std::mem::take(self);
+        // The names of features that nobody has seen bind nobody.
+        let features = if is_shown { features } else { Vec::new() };
+        *self = Self { name, features, is_shown, is_forgotten: true, ..Self::default() };
+    }
+
+    /// Forgets a field, or the numbers of this name.
+    pub(super) fn forget(&mut self, name: &str) -> Result<(), Fault> {
+        if let Some(place) = self.fields.iter().position(|(known, ..)| known == name) {
+            self.fields.remove(place);
+            return Ok(());
+        }
+        let numbers = [
+            (GHOST_CELLS, &mut self.ghosts),
+            (GLOBAL_VERTICES, &mut self.global_vertices),
+            (GLOBAL_CELLS, &mut self.global_cells),
+        ];
+        let mut known: Vec<&str> = self.fields.iter().map(|(field, ..)| field.as_str()).collect();
+        for (of, array) in numbers {
+            if array.is_some() {
+                if of == name {
+                    *array = None;
+                    return Ok(());
+                }
+                known.push(of);
+            }
+        }
+        let expected = match nearest(name, known.iter().copied()) {
+            Some(near) => format!("one that was named; did you mean '{near}'?"),
+            None if known.is_empty() => "one that was named; none was".into(),
+            None => format!("one that was named: {}", known.join(", ")),
+        };
+        let what = format!("channel '{}', what to forget", self.name);
+        Err(Fault::invalid(what, format!("'{name}'"), expected))
     }
 
     /// # Safety

@@ -79,15 +79,17 @@ export! {
             let step = Step { cycle, time, time_step };
             // Refused with what else is wrong on one rank: the others would wait for it.
             let given = check_cycle(cycle).and_then(|()| {
+                let there = run.channels.iter().filter(|named| !named.is_forgotten);
                 // SAFETY: as the crate's page says: the arrays live while this call runs.
-                let channels = run.channels.iter().map(|named| unsafe { named.channel() });
+                let channels = there.map(|named| unsafe { named.channel() });
                 let channels = channels.collect::<Result<_, _>>()?;
                 Ok(Shown { step, looked_at: under_way.looks_at(&step), channels })
             });
             if !under_way.execute(given)? {
                 return Err(ExecuteError::NoChannel { cycle }.into());
             }
-            run.channels.iter_mut().for_each(|named| named.is_shown = true);
+            let there = run.channels.iter_mut().filter(|named| !named.is_forgotten);
+            there.for_each(|named| named.is_shown = true);
             let order = under_way.asked().motion.as_ref().map(|motion| motion.order.as_str());
             if let Some(order) = order.filter(|order| run.motion_order.to_bytes() != order.as_bytes()) {
                 run.motion_order = c_string(order);

@@ -140,6 +140,19 @@ fn a_solver_can_take_the_motion_of_the_boundary_alone() {
 }
 
 #[test]
+fn what_is_forgotten_is_not_read_any_more() {
+    let directory = installed();
+    let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/forget.c"));
+    succeed(under_valgrind(&program).current_dir(directory.path()));
+    let has_estimate = |cycle: u32| {
+        let file = directory.path().join(format!("forget-{cycle}.vtu"));
+        let written = read_mesh(file).expect("was written");
+        written.fields.iter().any(|field| field.name == "error_estimate")
+    };
+    assert!(has_estimate(0) && !has_estimate(1) && !has_estimate(4));
+}
+
+#[test]
 fn a_mesh_of_two_coordinates_stays_in_its_plane() {
     let directory = installed();
     let program = compile(directory.path(), "c99", &project().join("bindings/c/tests/plate.c"));

@@ -96,6 +96,8 @@ static void without_a_run(tombolo* run, const char* words)
   WRONG(tombolo_field_i64(run, "solid", "f", TOMBOLO_VERTEX, NULL, 0, 1), words);
   WRONG(tombolo_field_u8(run, "solid", "f", TOMBOLO_VERTEX, NULL, 0, 1), words);
   WRONG(tombolo_field_strided(run, "solid", "f", TOMBOLO_VERTEX, TOMBOLO_FLOAT64, axes, 3, 5, 24), words);
+  WRONG(tombolo_forget(run, "solid", "f"), words);
+  WRONG(tombolo_forget(run, "solid", NULL), words);
   WRONG(tombolo_execute(run, 0, 0.0, 0.1), words);
   WRONG(tombolo_motion_shape(run, &shape, &shapes), words);
   WRONG(tombolo_parameter_value(run, "p", &value), words);
@@ -241,6 +243,9 @@ static void arguments(void)
   AT_ONCE(TOMBOLO_WRONG_CALL, tombolo_field_f64(run, "solid", NULL, TOMBOLO_VERTEX, warm, 5, 1), "the field's name is a null pointer");
   AT_ONCE(TOMBOLO_INVALID, tombolo_field_strided(run, "solid", "f", TOMBOLO_VERTEX, TOMBOLO_FLOAT64, axes, 3, 5, 0), "found a stride of 0 bytes");
   AT_ONCE(TOMBOLO_INVALID, tombolo_ghost_cells(run, "solid", NULL, 2), "ghost cells: found a null pointer");
+  AT_ONCE(TOMBOLO_INVALID, tombolo_forget(run, "solid", "warn"), "channel 'solid', what to forget: found 'warn'; expected one that was named; did you mean 'warm'?");
+  AT_ONCE(TOMBOLO_INVALID, tombolo_forget(run, "solit", NULL), "channel: found 'solit'; expected one that tombolo_points has named; did you mean 'solid'?");
+  AT_ONCE(TOMBOLO_WRONG_CALL, tombolo_forget(run, NULL, NULL), "the channel's name is a null pointer");
   AT_ONCE(TOMBOLO_INVALID, tombolo_log((enum tombolo_level)9, NULL, NULL), "log: found the level 9");
 
   tombolo* run = good();

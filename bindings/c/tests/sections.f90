@@ -94,6 +94,10 @@ program sections
     moved => tombolo_coordinates(run)
     if (associated(moved)) wrong = wrong + 1
   end do
+  call right(tombolo_forget(run, "solid", "row"))
+  call refused(tombolo_forget(run, "solid", "row"), "channel 'solid', what to forget: found 'row'; expected one that was named")
+  call right(tombolo_forget(run, "solid"))
+  call refused(tombolo_forget(run, "solid"), "channel: found 'solid'; expected one that tombolo_points has named; none has been yet")
   call right(tombolo_finalize(run))
   if (tombolo_report(run) == "" .or. tombolo_version() == "") wrong = wrong + 1
   call right(tombolo_close(run))
