@@ -559,13 +559,16 @@ contains
     text = from_c(c_message())
   end function
 
-  ! Hands messages up to a level to a procedure; without one, to standard error.
+  ! Hands messages up to a level to a procedure; without one, to standard error. Where it is refused, the procedure before stays.
   integer(c_int) function tombolo_log(level, procedure) result(status)
     integer(c_int), intent(in) :: level
     procedure(tombolo_log_procedure), optional :: procedure
+    procedure(tombolo_log_procedure), pointer :: before
     if (present(procedure)) then
+      before => log_procedure
       log_procedure => procedure
       status = c_log(level, c_funloc(forward), c_null_ptr)
+      if (status /= TOMBOLO_OK) log_procedure => before
     else
       status = c_log(level, c_null_funptr, c_null_ptr)
     end if
