@@ -159,7 +159,9 @@ impl Lender {
         what: String,
     ) -> Read<Topology<'call>> {
         let layout = self.layout(given, &what)?;
-        if layout.axes != 2 || layout.shape[1] != vertices {
+        // An empty list, as a rank without any of these has it, is an array of one axis for NumPy.
+        let is_empty = layout.axes == 1 && layout.shape[0] == 0;
+        if !is_empty && (layout.axes != 2 || layout.shape[1] != vertices) {
             let found = format!("an array of shape {}", layout.shape_text());
             let expected = format!("(m, {vertices}), a row for each {cell_type}");
             return Err(argument(what, found, expected).into());

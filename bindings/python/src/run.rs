@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use pyo3::prelude::*;
@@ -41,6 +42,8 @@ pub(crate) struct Run {
     process: u32,
     links: [Option<String>; 2],
     stopper: Stopper,
+    /// Whether the run is at its end, which is known while another thread is in a call too.
+    has_ended: AtomicBool,
     /// What a handler of a signal has raised while the solver waited.
     raised: Raised,
 }
@@ -87,12 +90,18 @@ impl Run {
         }
     }
 
-    fn hold(&self) -> PyResult<MutexGuard<'_, State>> {
-        if std::process::id() != self.process {
-            return Err(CallError::new_err(
-                "the adaptor was made before this process was forked, and belongs to the other one; make one here",
-            ));
+    /// Refuses calls in a fork.
+    fn require_own_process(&self) -> PyResult<()> {
+        if std::process::id() == self.process {
+            return Ok(());
         }
+        Err(CallError::new_err(
+            "the adaptor was made before this process was forked, and belongs to the other one; make one here",
+        ))
+    }
+
+    fn hold(&self) -> PyResult<MutexGuard<'_, State>> {
+        self.require_own_process()?;
         self.free().ok_or_else(|| {
             CallError::new_err("the adaptor is in another call; one thread at a time can use it")
         })
@@ -103,11 +112,15 @@ impl Stage {
     fn run(&mut self) -> PyResult<&mut foreign::Run> {
         match self {
             Stage::UnderWay(run) => Ok(run),
-            Stage::Ended(_) => Err(CallError::new_err(
-                "called after finalize, or after the end of the `with` block; the run has ended",
-            )),
+            Stage::Ended(_) => Err(after_the_end()),
         }
     }
+}
+
+fn after_the_end() -> PyErr {
+    CallError::new_err(
+        "called after finalize, or after the end of the `with` block; the run has ended",
+    )
 }
 
 /// The step of a call.
@@ -219,6 +232,7 @@ impl Run {
             links: [run.link(), run.watching_link()],
             stopper: run.stopper(),
             raised,
+            has_ended: AtomicBool::new(false),
             process: std::process::id(),
             state: Mutex::new(State {
                 told: run.asked().parameters.clone(),
@@ -341,9 +355,14 @@ impl Run {
         serde_json::to_string(&orders).map_err(|error| FailedError::new_err(error.to_string()))
     }
 
-    /// Asks the solver to end, from any thread.
-    fn stop(&self) {
+    /// Asks the solver to end, from any thread, also while another is in a call.
+    fn stop(&self) -> PyResult<()> {
+        self.require_own_process()?;
+        if self.has_ended.load(Ordering::Relaxed) {
+            return Err(after_the_end());
+        }
         self.stopper.stop();
+        Ok(())
     }
 
     #[getter]
@@ -366,6 +385,7 @@ impl Run {
     fn finalize(&self, py: Python<'_>) -> PyResult<String> {
         let mut state = self.hold()?;
         state.stage.run()?;
+        self.has_ended.store(true, Ordering::Relaxed);
         let stage = std::mem::replace(&mut state.stage, Stage::Ended("{}".to_owned()));
         let Stage::UnderWay(run) = stage else { return Ok("{}".to_owned()) };
         let (report, ended) = guarded(|| Ok(py.detach(|| run.finalize())))?;

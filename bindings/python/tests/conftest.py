@@ -160,7 +160,9 @@ class Solver:
 
     def close(self):
         self.end.set()
-        self.adaptor.stop()
+        # It may have come to its end by itself.
+        with contextlib.suppress(tombolo.CallError):
+            self.adaptor.stop()
         self.thread.join(20)
         assert not self.thread.is_alive()
         if self.error is not None:

@@ -395,12 +395,14 @@ adaptor = tombolo.Adaptor({"version": 1, "stream": {"listen": "127.0.0.1:0"}})
 adaptor.execute(0, 0.0, 0.1, tombolo.Mesh(points, cells))
 child = os.fork()
 if child == 0:
-    try:
-        adaptor.execute(1, 0.0, 0.1, tombolo.Mesh(points, cells))
-    except tombolo.CallError as error:
-        del adaptor
-        sys.exit(7 if "forked" in str(error) else 1)
-    sys.exit(2)
+    told = []
+    for call in (lambda: adaptor.execute(1, 0.0, 0.1, tombolo.Mesh(points, cells)), adaptor.stop):
+        try:
+            call()
+        except tombolo.CallError as error:
+            told.append("forked" in str(error))
+    del call, adaptor
+    sys.exit(7 if told == [True, True] else 1)
 status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 adaptor.execute(1, 0.0, 0.1, tombolo.Mesh(points, cells))
 adaptor.finalize()
@@ -412,6 +414,29 @@ sys.exit(0 if status == 7 else 1)
         [sys.executable, "-X", "dev", "-W", "error", "-c", program], timeout=60, capture_output=True, check=False
     )
     assert done.returncode == 0, done.stderr.decode()
+
+
+def test_a_run_that_has_ended_cannot_be_stopped():
+    adaptor = tombolo.Adaptor()
+    adaptor.stop()
+    assert adaptor.execute(0, 0.0, 0.1, mesh()).stop
+    adaptor.stop()
+    adaptor.finalize()
+    with pytest.raises(tombolo.CallError, match="called after finalize"):
+        adaptor.stop()
+
+
+def test_an_empty_list_is_no_cells_and_no_faces():
+    with tombolo.Adaptor() as adaptor:
+        adaptor.execute(0, 0.0, 0.1, mesh(cells={"tetra": TETS, "pyramid": []}))
+    for nothing in ([], {"triangle": []}, {"quad": [], "triangle": np.empty(0)}):
+        # Of a rank by itself the name is that of a feature without faces, which is told by its name.
+        told = pytest.raises(tombolo.MeshError, match="'lid' has the number .*, which no face has")
+        with tombolo.Adaptor() as adaptor, told:
+            adaptor.execute(0, 0.0, 0.1, mesh(faces={**FACES, "lid": nothing}))
+    told = pytest.raises(tombolo.MeshError, match="found an array of shape")
+    with tombolo.Adaptor() as adaptor, told:
+        adaptor.execute(0, 0.0, 0.1, mesh(cells={"tetra": np.empty((0, 5), int)}))
 
 
 def test_points_of_two_coordinates_come_back_so():

@@ -148,6 +148,22 @@ except BaseException as error:
     tell(kind=type(error).__name__, text=str(error))
 """
 
+EMPTY = """
+points, mesh = slab(world.rank)
+if world.rank == 1:
+    mesh.faces = {"top": [], "bottom": {"quad": []}}
+with tombolo.Adaptor(communicator=world, output=sys.argv[1]) as adaptor:
+    for cycle in range(2):
+        adaptor.execute(cycle, 0.1 * cycle, 0.1, {"solid": mesh})
+tell(done=True)
+"""
+
+
+@pytest.mark.skipif(not _native.DISTRIBUTED, reason="built without MPI")
+def test_a_rank_without_faces_says_so_by_empty_lists(tmp_path):
+    assert all(told["done"] for told in told_by(EMPTY, 2, tmp_path))
+
+
 MISTAKES = {
     "cycle": ("StepError", "cycle: found -1"),
     "time": ("StepError", "time: found None; expected a number"),

@@ -438,7 +438,13 @@ class Adaptor:
         return orders
 
     def stop(self) -> None:
-        """Ask the solver to end: the next `execute` says so. From any thread."""
+        """Ask the solver to end: the next `execute` says so. From any thread, also while another is in `execute`.
+
+        Raises
+        ------
+        CallError
+            The run has ended, or this process was forked from that of the run.
+        """
         self._run.stop()
 
     def finalize(self) -> dict[str, Any]:

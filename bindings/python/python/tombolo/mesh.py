@@ -70,8 +70,8 @@ class Mesh:
         most 9 components; a `Field` where it has to be said which.
     faces : dict, optional
         Named parts of the boundary, which edits can move or hold: from names to faces by their vertices, `(m, 3)` or
-        `(m, 4)`, or a dict from types to such arrays. A face in several of them is of the first. Left out: parts are
-        found between sharp edges.
+        `(m, 4)`, or a dict from types to such arrays. A face in several of them is of the first. A rank that has none
+        of a part says so by an empty list. Left out: parts are found between sharp edges.
     vertex_features : array of shape (n,), optional
         In place of `faces`: of each vertex the number of its part.
     ghost_cells : array of shape (m,), optional
