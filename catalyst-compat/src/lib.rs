@@ -24,7 +24,10 @@
 //!   pipeline with `"on": "order"`. The cells are those of the topology of the highest dimension;
 //!   an integer element field `features`, `boundary_attribute` or `<topology>_attribute` on a
 //!   topology of its faces says which feature each belongs to, and `state/features/<name>` of the
-//!   channel names them. An integer vertex field `features` does so for vertices.
+//!   channel names them; the faces may be in several topologies, with a field on each. An integer
+//!   vertex field `features` does so for vertices. Other topologies of the main dimension, and
+//!   fields of any other, are passed over; each is told once. Orders stay in the plane of a mesh
+//!   whose coordsets have x and y alone.
 //!
 //! # What is handed back
 //! By `catalyst_results` after each `catalyst_execute`: `catalyst/<channel>` where the mesh is to
