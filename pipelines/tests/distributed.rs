@@ -157,7 +157,7 @@ fn a_field_that_is_wrong_on_one_rank_stops_nobody() {
         // Rank 1 lacks one field.
         let fields = [FieldView::vertex("speed", &speed), FieldView::vertex("other", &speed)];
         let shown = &fields[..if rank == 1 { 1 } else { 2 }];
-        let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown(part, &fields) }];
+        let channels = [Channel { name: "fluid", mesh: part.view(), fields: shown }];
         let text = r#"{"version": 1, "pipelines": [{"name": "all", "every": {"steps": 1}, "stages": [
             {"surface": {}}, {"statistics": {"field": "other"}}, {"statistics": {"field": "speed"}}, {"stream": {}}]}]}"#;
         let mut runner =
