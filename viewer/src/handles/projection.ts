@@ -24,8 +24,8 @@ export class Projection {
   }
 
   private value(index: number, point: Vector): number {
-    const { normal, offset } = this.row(index);
-    return dot(normal, point) + offset;
+    const { matrix } = this, at = 4 * index;
+    return matrix[at]! * point[0] + matrix[at + 1]! * point[1] + matrix[at + 2]! * point[2] + matrix[at + 3]!;
   }
 
   /** Where a point is drawn; null where it lies behind the viewer. */

@@ -18,12 +18,15 @@ export const colourMap = (name: string): ColourMap => COLOUR_MAPS.find((map) => 
 export const gradient = (map: ColourMap, direction: string): string =>
   `linear-gradient(${direction}, ${map.stops.map((stop) => `rgb(${stop.map((x) => Math.round(x * 255)).join(" ")})`).join(", ")})`;
 
-/** The scalars of a field, one per point or element: the magnitude of a vector, or one of its components. */
-export function scalars(field: DataArray, component: number): Float64Array {
+/**
+ * The scalars of a field, one per point or element: the magnitude of a vector, or one of its components. `room` is where those of a vector
+ * are written, if they are as many.
+ */
+export function scalars(field: DataArray, component: number, room?: Float64Array): Float64Array {
   const { components, values } = field;
   if (components === 1) return values;
   const count = values.length / components;
-  const result = new Float64Array(count);
+  const result = room?.length === count ? room : new Float64Array(count);
   for (let i = 0; i < count; i++) {
     if (component >= 0) {
       result[i] = values[i * components + Math.min(component, components - 1)]!;
@@ -54,21 +57,16 @@ export const NO_NUMBER = 0.5;
 export const GREY = `rgb(${Array(3).fill(Math.round(255 * NO_NUMBER)).join(" ")})`;
 export const NO_NUMBER_TEXT = "no number";
 
-/** Whether some value is no number. */
-export function hasGaps(values: Float64Array): boolean {
-  for (const value of values) if (Number.isNaN(value)) return true;
-  return false;
-}
-
-/** Smallest and largest finite value; null when there is none. */
-export function extremes(values: Float64Array): [number, number] | null {
-  let low = Infinity;
-  let high = -Infinity;
-  for (const value of values) {
+/** Smallest and largest finite value, null when there is none; and whether some value is no number. Nothing is made for each value. */
+export function extremes(values: Float64Array): { range: [number, number] | null; hasGaps: boolean } {
+  let low = Infinity, high = -Infinity, hasGaps = false;
+  for (let i = 0; i < values.length; i++) {
+    const value = values[i]!;
     if (value < low && value !== -Infinity) low = value;
     if (value > high && value !== Infinity) high = value;
+    if (Number.isNaN(value)) hasGaps = true;
   }
-  return low <= high ? [low, high] : null;
+  return { range: low <= high ? [low, high] : null, hasGaps };
 }
 
 /** The names of a field's components. */

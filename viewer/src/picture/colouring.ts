@@ -5,7 +5,7 @@ import vtkDataArray from "@kitware/vtk.js/Common/Core/DataArray";
 import type vtkPolyData from "@kitware/vtk.js/Common/DataModel/PolyData";
 import type { DataArray } from "../connection/protocol";
 import type { Look } from "../store/looks";
-import { NO_NUMBER, colourMap, extremes, hasGaps, mapped, scalars } from "./colour";
+import { NO_NUMBER, colourMap, extremes, mapped, scalars } from "./colour";
 import type { Range } from "./ranges";
 
 /** vtk.js lets no coordinate be farther from its texture. */
@@ -22,7 +22,9 @@ export class Colouring {
   readonly table = vtkColorTransferFunction.newInstance();
   private map = "";
   private taken: Taken | null = null;
-  private painted: { values: Float64Array; low: number; high: number; logarithmic: boolean } | null = null;
+  private painted: { taken: Taken; low: number; high: number; logarithmic: boolean } | null = null;
+  /** Where the scalars of vectors are written, those of each frame over those of the one before. */
+  private room = new Float64Array(0);
   private drawn: vtkDataArray | null = null;
 
   constructor(private readonly data: vtkPolyData, private readonly mapper: vtkMapper) {
@@ -47,10 +49,11 @@ export class Colouring {
   take(field: DataArray | null, component: number, triangles: number): Range | null {
     if (!field) this.taken = null;
     else if (this.taken?.field !== field || this.taken.component !== component) {
-      const values = scalars(field, component);
+      const values = scalars(field, component, this.room);
+      if (values !== field.values) this.room = values as Float64Array<ArrayBuffer>;
       // vtk.js numbers the lines of a view before its triangles.
       const isReordered = field.association === "element" && triangles > 0 && triangles < values.length;
-      this.taken = { field, component, values: isReordered ? linesFirst(values, triangles) : values, range: extremes(values), hasGaps: hasGaps(values) };
+      this.taken = { field, component, values: isReordered ? linesFirst(values, triangles) : values, ...extremes(values) };
     }
     this.mapper.setScalarVisibility(this.taken !== null);
     return this.taken?.range ?? null;
@@ -62,8 +65,8 @@ export class Colouring {
     if (!taken) return;
     this.setMap(map);
     const { values, field } = taken;
-    if (painted?.values === values && painted.low === low && painted.high === high && painted.logarithmic === logarithmic) return;
-    this.painted = { values, low, high, logarithmic };
+    if (painted?.taken === taken && painted.low === low && painted.high === high && painted.logarithmic === logarithmic) return;
+    this.painted = { taken, low, high, logarithmic };
     const ofPoints = field.association === "vertex";
     if (ofPoints && this.drawn?.getNumberOfTuples() === values.length && this.data.getPointData().getScalars() === this.drawn) {
       mapped(values, [low, high], logarithmic, this.drawn.getData() as Float32Array);

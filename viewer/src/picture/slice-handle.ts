@@ -9,6 +9,7 @@ import { add, across, AXES, dot, length, normalised, times } from "../handles/ve
 import { toStep } from "../handles/rounding";
 import { atOffset, extent, offsetOf } from "../store/pipelines";
 import type { Plane } from "../store/pipelines";
+import { sameParts } from "../store/store";
 
 /** How long the arrow is, in pixels. */
 const ARROW = 46;
@@ -36,6 +37,8 @@ export class SliceHandle {
   private readonly halo = svg("circle", { class: "halo", r: String(reachOf("touch")) });
   private readonly grip = svg("g", { class: "grip" });
   private readonly title = svg("title");
+  /** The end of the slice that is seen farthest to the left, and of what it was sought. */
+  private sought: { of: readonly unknown[]; end: Vector | null } = { of: [], end: null };
   /** `down` is the event that began it. */
   private drag: { down: PointerEvent; plane: Plane; from: number; start: number; offset: number } | null = null;
 
@@ -66,7 +69,7 @@ export class SliceHandle {
     const corners = projection ? cut.map((point) => projection.toPicture(point)) : [];
     const normal = plane && normalised(plane.normal);
     // At the end of the slice itself that is seen farthest to the left, where it hides little; it goes with the drag. Other planes may be cut with it.
-    const at = projection && box ? leftmost(this.picture.points(), projection, near(plane, box)) ?? leftmost(this.picture.points(), projection) : null;
+    const at = projection && box ? this.leftEnd(plane, box, projection) : null;
     const by = this.drag && plane && at ? this.drag.offset - dot(at, normalised(plane.normal)) : 0;
     const point = at && normal ? add(at, times(normal, by)) : null;
     const from = point && projection ? projection.toPicture(point) : null;
@@ -82,6 +85,14 @@ export class SliceHandle {
     this.outline.setAttribute("points", corners.map((corner) => corner.map((part) => part.toFixed(1)).join(",")).join(" "));
     for (const [name, value] of [["x1", from[0]], ["y1", from[1]], ["x2", tip[0]], ["y2", tip[1]]] as const) this.shaft.setAttribute(name, value.toFixed(1));
     for (const circle of [this.halo, this.knob]) for (const [name, value] of [["cx", tip[0]], ["cy", tip[1]]] as const) circle.setAttribute(name, value.toFixed(1));
+  }
+
+  /** The end of the slice that is seen farthest to the left. It stays where it is as long as only values come. */
+  private leftEnd(plane: Plane, box: readonly [Vector, Vector], projection: Projection): Vector | null {
+    const points = this.picture.points();
+    const of = [points, plane, projection.key, ...box[0], ...box[1]];
+    if (!sameParts(of, this.sought.of)) this.sought = { of, end: leftmost(points, projection, near(plane, box)) ?? leftmost(points, projection) };
+    return this.sought.end;
   }
 
   /** How far along the normal the pointer is, in units of the mesh. */

@@ -23,11 +23,12 @@ export function slowLink(state: State, now: number): string {
   const shown = frames.cycle;
   const reached = progress.find(({ cycle }) => cycle >= shown);
   const age = reached ? now - reached.at : 0;
+  if (age < OLD) return "";
   const gaps = Object.values(frames.views).flatMap((view) => view.gaps);
   const least = Math.min(...gaps, Infinity);
   const behind = status.cycle - shown;
   // A view that is seldom sent is no sign of that.
-  if (age < OLD || !Number.isFinite(least) || behind < 3 * least) return "";
+  if (!Number.isFinite(least) || behind < 3 * least) return "";
   const due = gaps.reduce((sum, gap) => sum + Math.round(gap / least), 0);
   const lost = due > gaps.length ? `; ${due - gaps.length} of the last ${due} frames were left out` : "";
   return `The picture is behind: ${Math.round(age / 1000)} s old, ${behind} cycles${lost}.`;

@@ -67,8 +67,12 @@ export function derived<S, T>(parts: (state: S) => readonly unknown[], compute: 
   };
 }
 
-/** Whether two values are the same as JSON: for what a selector makes anew each time. */
-export const sameJson = (a: unknown, b: unknown): boolean => Object.is(a, b) || JSON.stringify(a) === JSON.stringify(b);
+/** Whether two values are the same as JSON: for what a selector makes anew each time. No text is made of lists whose parts are the same. */
+export const sameJson = (a: unknown, b: unknown): boolean => isAlike(a, b) || JSON.stringify(a) === JSON.stringify(b);
+
+/** Whether two values are one, or lists of such. */
+const isAlike = (a: unknown, b: unknown): boolean =>
+  Object.is(a, b) || (Array.isArray(a) && Array.isArray(b) && a.length === b.length && a.every((part, i) => isAlike(part, b[i])));
 
 /** Whether all parts of one list are those of the other: for a selector that takes several parts of the state. */
 export const sameParts = (a: readonly unknown[], b: readonly unknown[]): boolean => a.length === b.length && a.every((part, i) => Object.is(part, b[i]));

@@ -147,6 +147,19 @@ describe("colours", () => {
     expect(changed).toHaveBeenCalled();
   });
 
+  it("of a vector follow its values, for which no room is made anew", () => {
+    const vector = (cycle: number, lengths: number[]): DataFrame => ({ ...frame(cycle, []), fields: [{ name: "p", association: "vertex", components: 2, values: Float64Array.from(lengths.flatMap((value) => [0.6 * value, -0.8 * value])) }] });
+    layer.look = { ...layer.look, component: -1 };
+    const { colouring } = layer as unknown as { colouring: { taken: { values: Float64Array } } };
+    const told = (): number[] => [...parts.surface.data.getPointData().getScalars().getData()].map((value) => Number(value.toFixed(6)));
+    show(vector(1, [0, 1, 2, 4]), [0, 4]);
+    const { values } = colouring.taken;
+    expect(told()).toEqual([0, 0.25, 0.5, 1]);
+    show(vector(2, [4, 2, 1, 0]), [0, 4]);
+    expect(told()).toEqual([1, 0.5, 0.25, 0]);
+    expect(colouring.taken.values).toBe(values);
+  });
+
   it("of elements follow their values, also between those of points", () => {
     show(frame(1, [0, 1, 2, 3]));
     drawn();

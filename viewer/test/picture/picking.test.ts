@@ -37,8 +37,18 @@ describe("scalars", () => {
   it("are the magnitude or a component", () => {
     expect([...scalars(field, -1)]).toEqual([5, 2]);
     expect([...scalars(field, 1)]).toEqual([4, 0]);
-    expect(extremes(Float64Array.from([NaN, 2, -1, Infinity]))).toEqual([-1, 2]);
-    expect(extremes(new Float64Array(0))).toBeNull();
+    expect(extremes(Float64Array.from([NaN, 2, -1, Infinity]))).toEqual({ range: [-1, 2], hasGaps: true });
+    expect(extremes(Float64Array.from([2, -1]))).toEqual({ range: [-1, 2], hasGaps: false });
+    expect(extremes(new Float64Array(0))).toEqual({ range: null, hasGaps: false });
+  });
+
+  it("of a vector are written where there is room for them, and those of a number are its own", () => {
+    const room = new Float64Array(2);
+    expect(scalars(field, -1, room)).toBe(room);
+    expect([...room]).toEqual([5, 2]);
+    expect(scalars(field, 1, new Float64Array(3))).toHaveLength(2);
+    const single = { ...field, components: 1 };
+    expect(scalars(single, -1, room)).toBe(field.values);
   });
 });
 

@@ -1,11 +1,12 @@
 // @vitest-environment jsdom
 import { describe, expect, it, vi } from "vitest";
 import type { Vector } from "../../src/connection/protocol";
+import { Projection } from "../../src/handles/projection";
 import { add, dot, length, normalised, times } from "../../src/handles/vector";
 import { outlineOf, SliceHandle } from "../../src/picture/slice-handle";
 import { offsetOf } from "../../src/store/pipelines";
 import type { Plane } from "../../src/store/pipelines";
-import { OBLIQUE } from "../handles/cameras";
+import { OBLIQUE, PARALLEL } from "../handles/cameras";
 
 const BOX: [Vector, Vector] = [[0, 0, 0], [2, 1, 1]];
 
@@ -54,6 +55,29 @@ describe("the knob of a slice", () => {
     send("pointerup", 40);
     send("pointermove", 80);
     expect(move).toHaveBeenCalledOnce();
+  });
+
+  it("is not sought anew where only values have come, and is where the points, the plane or the picture are other ones", () => {
+    const root = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+    let plane: Plane = { origin: [1, 0.5, 0.2], normal: [0, 0, 2] }, points = Float32Array.of(0, 0, 0.2, 2, 1, 0.2), projection = OBLIQUE;
+    const looked = vi.spyOn(Projection.prototype, "toPicture");
+    const handle = new SliceHandle(root, document.createElement("div"), { projection: () => projection, points: () => points, bounds: () => [[...BOX[0]], [...BOX[1]]], redraw: () => undefined }, { get movable() { return plane; }, move: () => undefined });
+    const drawn = (): number => {
+      looked.mockClear();
+      handle.drawn();
+      return looked.mock.calls.length;
+    };
+    const first = drawn(), place = handle.place;
+    expect([drawn(), drawn()]).toEqual([first - 2, first - 2]);
+    expect(handle.place).toEqual(place);
+    points = Float32Array.of(0, 1, 0.2, 2, 1, 0.2);
+    expect(drawn()).toBe(first);
+    expect(handle.place).not.toEqual(place);
+    plane = { ...plane };
+    expect(drawn()).toBe(first);
+    projection = PARALLEL;
+    expect(drawn()).toBe(first);
+    looked.mockRestore();
   });
 
   it("leaves both fingers to the camera where a second one comes before the first has moved it, wherever that is put down", () => {

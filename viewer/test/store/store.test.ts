@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { Store, derived } from "../../src/store/store";
+import { Store, derived, sameJson } from "../../src/store/store";
 
 type Action = { add: number } | { name: string };
 const make = (failed?: (error: unknown) => void) => new Store({ count: 0, name: "" }, (state, action: Action) => ("add" in action
@@ -63,4 +63,10 @@ describe("the store", () => {
     expect(double({ count: 2, name: "b" })).toEqual({ double: 4 });
     expect(computed).toBe(2);
   });
+});
+
+it("writes no text to see that lists have the same parts", () => {
+  const part = { toJSON: () => { throw new Error("it was written"); } };
+  expect(sameJson([1, [part, NaN], undefined], [1, [part, NaN], undefined])).toBe(true);
+  expect([sameJson([{ a: 1 }], [{ a: 1 }]), sameJson([{ a: 1 }], [{ a: 2 }]), sameJson([1], [1, 1]), sameJson([], {})]).toEqual([true, false, false, false]);
 });
