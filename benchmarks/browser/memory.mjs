@@ -1,6 +1,6 @@
 /**
  * Watches the run at TOMBOLO_URL in Debian's Chromium for TOMBOLO_MINUTES and prints one line of JSON: the bytes of the page's heap after
- * each minute, and how many frames it was shown. The picture is turned a little now and then, as somebody does who watches.
+ * each minute, those held and those not yet collected, and how many frames it was shown. The picture is turned a little now and then, as somebody does who watches.
  */
 import { heap, link, openBrowser } from "./browser.mjs";
 
@@ -22,7 +22,7 @@ try {
   }
   const { frames, errors } = await page.evaluate(() => ({ frames: window.tombolo.frames, errors: window.tombolo.errors }));
   if (errors.length > 0) throw new Error(`the page had errors: ${errors.join("; ")}`);
-  console.log(JSON.stringify({ heaps, frames }));
+  console.log(JSON.stringify({ held: heaps.map(({ held }) => held), uncollected: heaps.map(({ uncollected }) => uncollected), frames }));
 } finally {
   await browser.close();
 }

@@ -131,9 +131,9 @@ try {
   }
 
   await page.waitForTimeout(3000);
-  const before = await heap(page);
+  const { held: before } = await heap(page);
   await page.waitForTimeout(HEAP_SECONDS * 1000);
-  const heapGrowth = (await heap(page)) - before;
+  const heapGrowth = (await heap(page)).held - before;
 
   console.log(JSON.stringify({
     triangles, first_picture: firstPicture / 1000, wire, shown: spread(shown), rotating: spread(byKeys.times), frames_with_values: byKeys.came,
