@@ -417,7 +417,8 @@ fn the_fraction_that_is_told_of_a_refused_order_passes() {
         assert!(passes.is_ok(), "{fraction}: {}", passes.unwrap_err());
         let clamp = Guard { otherwise: Otherwise::Clamp, ..guard };
         let clamped = shaper.plan(&Request { guard: clamp, ..whole }).unwrap().target().fraction;
-        assert!((clamped - fraction).abs() < 0.1, "{clamped} {fraction}");
+        // A search may find more where an edit turns: no part of it lies on the straight way to all of it.
+        assert!(fraction < clamped + 0.01, "{clamped} {fraction}");
     }
 }
 
