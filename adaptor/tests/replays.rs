@@ -394,7 +394,8 @@ fn a_replay_is_watched_and_not_steered() {
     solver.step_until_told(&mut viewer, "pipelines", |told| {
         told["id"] == "c" && told["status"] == "applied"
     });
-    let shape = json!({"name": "carried out", "on": "order", "stages": [{"guard": {"otherwise": "clamp"}}]});
+    let shape =
+        json!({"name": "shape", "on": "order", "stages": [{"guard": {"otherwise": "clamp"}}]});
     viewer.send(&json!({"id": "d", "pipelines": {"set": [shape]}}));
     let error = solver.step_until_told(&mut viewer, "error", |error| error["id"] == "d");
     assert!(error["message"].as_str().unwrap().contains("replays a journal"), "{error}");

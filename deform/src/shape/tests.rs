@@ -389,7 +389,7 @@ fn what_one_solve_does_not_reach_is_mended_alike() {
 fn the_fraction_that_is_told_of_a_refused_order_passes() {
     let mesh = box_of_tets([6, 6, 6], [0.0; 3], [1.0; 3]);
     let turn = json!({"rotate": {"features": ["z-max"], "fixed": ["z-min"], "axis": [0, 0, 1], "degrees": 170}});
-    let squeeze = json!({"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [0.05, 0.05, 1]}});
+    let squeeze = json!({"scale_direction": {"features": ["z-max"], "fixed": ["z-min"], "factors": [0.7, 0.7, 1]}});
     let sink =
         json!({"translate": {"features": ["z-max"], "fixed": ["z-min"], "by": [0.3, 0, -1.4]}});
     let slight =
