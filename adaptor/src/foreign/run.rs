@@ -370,8 +370,8 @@ impl Run {
             return false;
         }
         match channels.iter().position(|channel| channel.name == self.steered) {
-            Some(place) => {
-                channels[..=place].rotate_right(1);
+            Some(index) => {
+                channels[..=index].rotate_right(1);
                 false
             }
             None => !channels.is_empty(),

@@ -122,8 +122,8 @@ impl Named {
 
     /// Forgets a field, or the numbers of this name.
     pub(super) fn forget(&mut self, name: &str) -> Result<(), Fault> {
-        if let Some(place) = self.fields.iter().position(|(known, ..)| known == name) {
-            self.fields.remove(place);
+        if let Some(index) = self.fields.iter().position(|(known, ..)| known == name) {
+            self.fields.remove(index);
             return Ok(());
         }
         let numbers = [

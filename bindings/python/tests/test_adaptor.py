@@ -431,7 +431,7 @@ def test_an_empty_list_is_no_cells_and_no_faces():
         adaptor.execute(0, 0.0, 0.1, mesh(cells={"tetra": TETS, "pyramid": []}))
     for nothing in ([], {"triangle": []}, {"quad": [], "triangle": np.empty(0)}):
         # Of a rank by itself the name is that of a feature without faces, which is told by its name.
-        told = pytest.raises(tombolo.MeshError, match="'lid' has the number .*, which no face has")
+        told = pytest.raises(tombolo.MeshError, match=r"'lid' has the number .*, which no face has")
         with tombolo.Adaptor() as adaptor, told:
             adaptor.execute(0, 0.0, 0.1, mesh(faces={**FACES, "lid": nothing}))
     told = pytest.raises(tombolo.MeshError, match="found an array of shape")
