@@ -160,14 +160,14 @@ impl Part {
     /// same seed.
     #[must_use]
     pub fn shuffled(&self, seed: u64) -> Self {
-        let vertices = order(self.points.len(), seed);
-        let cells = order(self.cells.len(), seed ^ 0x5DEE_CE66);
+        let vertices = random_order(self.points.len(), seed);
+        let cells = random_order(self.cells.len(), seed ^ 0x5DEE_CE66);
         self.reordered(&vertices, &cells)
     }
 }
 
 /// A random order (Fisher and Yates) from a seed (splitmix64).
-pub(crate) fn order(length: usize, mut seed: u64) -> Vec<usize> {
+pub(crate) fn random_order(length: usize, mut seed: u64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..length).collect();
     for last in (1..length).rev() {
         seed = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
