@@ -166,7 +166,7 @@ impl Writer {
     }
 }
 
-/// What is said of a disk that hangs.
+/// The reason for which files are left out while the disk hangs.
 const HANGS: &str = "the disk has finished nothing for a minute";
 
 /// How long a thread has come to the end of nothing.

@@ -106,7 +106,7 @@ unsafe extern "C" fn initialize(params: *const RawNode) -> c_int {
         // SAFETY: the caller of a Catalyst function hands over null or a live node of the host's
         // Conduit.
         let node = unsafe { Node::root(host, params) }?;
-        // What cannot be read ends nothing.
+        // A configuration that cannot be read must not end the run before.
         let set_up = SetUp::read(&node)?;
         // The one before ends first, with its server. What was not written then is told, but is no
         // reason to have no run.

@@ -32,8 +32,8 @@ enum Stage {
     UnderWay(Box<Run>),
 }
 
-/// What a run is to begin with, which all ranks can read. It is known before anything is done, so that a
-/// run before is ended only for one that can be described.
+/// The configuration of a run and its ranks, read and agreed upon before the run begins: one that cannot
+/// be read ends no earlier run.
 pub(crate) struct SetUp {
     communicator: Arc<dyn Communicator>,
     configuration: Configuration,

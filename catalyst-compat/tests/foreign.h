@@ -197,6 +197,19 @@ static inline void array(conduit_node* node, const char* path, int64_t id, const
   put(at(node, path), id, data, count, offset, stride ? stride : bytes_of(id), 0);
 }
 
+/* A mesh of cells of one shape, over points one after the other. Both arrays stay the caller's. */
+static inline void unstructured(conduit_node* mesh, const char* shape, const double* xyz, int64_t points, const int32_t* corners, int64_t count)
+{
+  text(mesh, "coordsets/coords/type", "explicit");
+  array(mesh, "coordsets/coords/values/x", FLOAT64, xyz, points, 0, 24);
+  array(mesh, "coordsets/coords/values/y", FLOAT64, xyz, points, 8, 24);
+  array(mesh, "coordsets/coords/values/z", FLOAT64, xyz, points, 16, 24);
+  text(mesh, "topologies/mesh/type", "unstructured");
+  text(mesh, "topologies/mesh/coordset", "coords");
+  text(mesh, "topologies/mesh/elements/shape", shape);
+  array(mesh, "topologies/mesh/elements/connectivity", INT32, corners, count, 0, 0);
+}
+
 struct catalyst_impl {
   int version;
   int (*initialize)(const conduit_node*);

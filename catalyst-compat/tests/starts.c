@@ -27,14 +27,7 @@ static conduit_node* step(int cycle)
   number(&node, "catalyst/state/time", 0.1 * cycle);
   text(&node, "catalyst/channels/grid/type", "mesh");
   conduit_node* mesh = at(&node, "catalyst/channels/grid/data");
-  text(mesh, "coordsets/coords/type", "explicit");
-  array(mesh, "coordsets/coords/values/x", FLOAT64, xyz, 4, 0, 24);
-  array(mesh, "coordsets/coords/values/y", FLOAT64, xyz, 4, 8, 24);
-  array(mesh, "coordsets/coords/values/z", FLOAT64, xyz, 4, 16, 24);
-  text(mesh, "topologies/mesh/type", "unstructured");
-  text(mesh, "topologies/mesh/coordset", "coords");
-  text(mesh, "topologies/mesh/elements/shape", "tet");
-  array(mesh, "topologies/mesh/elements/connectivity", INT32, tet, 4, 0, 0);
+  unstructured(mesh, "tet", xyz, 4, tet, 4);
   return &node;
 }
 

@@ -206,7 +206,7 @@ impl Checkpoint {
         let run: SavedRun = serde_json::from_slice(reader.bytes()?)
             .map_err(|error| CheckpointError::Damaged(error.to_string()))?;
         if rest.len() as u64 != expected {
-            // Those of other ranks follow.
+            // The checkpoints of other ranks follow in the same file.
             return Err(match run.ranks {
                 found @ 2.. => CheckpointError::Ranks { found, expected: 1 },
                 _ => torn(),

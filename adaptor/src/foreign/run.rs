@@ -386,7 +386,7 @@ impl Run {
             if self.measured.contains(&channel.name) {
                 continue;
             }
-            // What rank 0 says counts for the orders, but it may have no vertex of this channel.
+            // Orders are refused by rank 0, which may have no vertex of this channel.
             let mut most = [channel.dimension() as u64];
             self.communicator.reduce_integers(Reduction::Maximum, &mut most);
             if most[0] == 0 {

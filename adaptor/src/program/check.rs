@@ -91,7 +91,7 @@ pub(crate) fn check(options: &Options) -> Result<(), Failure> {
     }
 }
 
-/// What a file says, or all that is wrong with it.
+/// The content of the file, or every error in it.
 ///
 /// # Errors
 /// Where a file could not be read.
